@@ -417,7 +417,7 @@ class Layout:
         return {name: one for point in self.points for name, one in point_declarations(point)[1].items()}
 
     @cached_property
-    def turns(self) -> bool:
+    def has_heading_states(self) -> bool:
         """True when the cosine and the sine of the heading are states: the vehicle stays level, and they turn what is
         in the earth frame."""
         return self.has(YAW) and not self.has_attitude and (self.has(SURGE, SWAY) or bool(self.points))

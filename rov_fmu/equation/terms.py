@@ -96,7 +96,7 @@ class Equation:
 
     From the table follow, in this order: its states, and which of them the formulas of the orientation and the depth
     set; which states depend on which, and so the components that are solved one after the other; what ends a piece of a
-    step, and what lags; all formulas as one program, and the rates of the vehicle's own states; the functions of tables.
+    step, and what lags; all formulas as one program, and the rates of the vehicle's states; the functions of tables.
     """
 
     parameters: Mapping[str, Expression]
@@ -473,7 +473,7 @@ class _Table:
         """
         layout = self.layout
         rows: dict[str, tuple[Term, ...]] = {}
-        if layout.turns:
+        if layout.has_heading_states:
             rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
         for x, current, row in zip("xyz", CURRENT | CURRENT_DOWN, rotation(layout), strict=True):
             if x in layout.pose:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.messages import InputError, only, shown
+from rov_fmu.io.numbers import checked_length
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.steady import Steady, steady_with
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
@@ -221,9 +222,7 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used.
         """
-        from rov_fmu.interface.stepper import checked_length
-
-        return super().step(self._all_inputs(inputs), self._all_states(state), checked_length(h))
+        return super().step(self._all_inputs(inputs), self._all_states(state), checked_length("h", h))
 
     def stepper(
         self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None
@@ -265,9 +264,8 @@ class VehicleModel(Vehicle):
         """
         from rov_fmu.autopilot.gains import autopilot_of
         from rov_fmu.autopilot.pilot import Pilot
-        from rov_fmu.interface.stepper import checked_length
 
-        return Pilot(autopilot_of(self, checked_length(step), delay))
+        return Pilot(autopilot_of(self, checked_length("step", step), delay))
 
     def hold(
         self,
@@ -293,9 +291,7 @@ class VehicleModel(Vehicle):
         """
         import numpy as np
 
-        for name, value in (("seconds", seconds), ("step", step)):
-            if not (isinstance(value, (int, float, np.number)) and 0.0 < value <= 1e6):
-                raise InputError(f"{name} = {shown(value)}: must be more than 0, and at most 1e6")
+        seconds, step = (checked_length(key, x, 1e6) for key, x in (("seconds", seconds), ("step", step)))
         pilot, stepper = self.autopilot(step).hold(**aims), self.stepper(start=start)
         if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
             raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")

@@ -1,12 +1,11 @@
 """A vehicle that is stepped in the loop of a program, such as a controller."""
 
 from collections.abc import Mapping, Sequence
-from math import inf
-from numbers import Real
 
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.interface.arguments import held_inputs
-from rov_fmu.io.messages import InputError, shown
+from rov_fmu.io.messages import InputError
+from rov_fmu.io.numbers import checked_length
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -44,16 +43,9 @@ class VehicleStepper:
 
         Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
         """
-        h = checked_length(h)
+        h = checked_length("h", h)
         values = [*held_inputs(self._stepper.vehicle.layout, inputs, self._saturated).values()]
         try:
             return dict(zip(self._record, self._stepper.step(values, h), strict=True))
         except OverflowError as error:
             raise InputError(str(error)) from error
-
-
-def checked_length(h: float) -> float:
-    """Return the length of a step, s. Raises InputError if it is not above 0."""
-    if not (isinstance(h, Real) and 0.0 < h < inf):
-        raise InputError(f"h = {shown(h)}: must be a time above 0, s")
-    return float(h)

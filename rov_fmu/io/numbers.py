@@ -1,7 +1,10 @@
-"""Numbers as text, with the digits that their intervals or their readers need."""
+"""Numbers as text, with the digits that their intervals or their readers need, and lengths of time."""
 
 from decimal import Decimal
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
+from numbers import Real
+
+from rov_fmu.io.messages import InputError, shown
 
 _EXACT = 1e-9
 """The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
@@ -37,6 +40,17 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
 def _rounded(number: float, exponent: int) -> str:
     """Return a number rounded to a multiple of a power of ten: 36.98 for 36.982 and -2."""
     return _plain(+Decimal(number).quantize(Decimal(1).scaleb(exponent)))  # the sign makes 0 of -0
+
+
+def checked_length(key: str, length: float, most: float = inf) -> float:
+    """Return the length of a step or of a motion, s.
+
+    Raises InputError if it is not above 0, not finite, or above the longest one.
+    """
+    if not (isinstance(length, Real) and 0.0 < length <= most and isfinite(length)):
+        limit = f" and at most {most:g}" if isfinite(most) else ""
+        raise InputError(f"{key} = {shown(length)}: must be a time above 0{limit}, s")
+    return float(length)
 
 
 def significant(number: float, digits: int) -> str:
