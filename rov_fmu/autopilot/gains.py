@@ -115,7 +115,7 @@ def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing
 def _loop(vehicle: Vehicle, axis: Axis, sharing: Sharing, lag: float, step: float, delay: float) -> NDArray[np.void]:
     """Return the numbers of an axis. They follow the rule at the head of this file."""
     loop = np.zeros((), LOOP)
-    inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
+    inertia = vehicle.effective_inertia(axis)
     ends = np.array([sharing.tables[n][[0, -1], 0] for n in sharing.table_of])
     along = sharing.to_axis[:, AXES.index(axis)]
     most = min(np.abs(np.sort(along[:, np.newaxis] * ends, axis=1).sum(axis=0)))

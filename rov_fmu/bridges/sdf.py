@@ -243,7 +243,7 @@ def added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     for a, b in product(forms, repeat=2):
         i, j = _PLACES[a], _PLACES[b]
         mass = entries.get(f"mass_{a}{b}", entries.get(f"mass_{b}{a}", 0.0))
-        mass = vehicle.effective_inertia(forms[a]) if a == b else mass
+        mass = vehicle.effective_inertia(BY_VELOCITY[a]) if a == b else mass
         added[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
     size = np.sqrt(np.diag(rigid))
     return np.where(np.abs(added) < FAINT * np.outer(size, size), 0.0, added)
@@ -372,7 +372,7 @@ def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller
             n, unit = _PLACES[axis.velocity], BODY[axis.inertia].unit
             yield (
                 f"{beta} = {vehicle[beta]:g}: the effective inertia in {axis.name} "
-                f"is {vehicle.effective_inertia(part):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
+                f"is {vehicle.effective_inertia(axis):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
             )
 
 
@@ -406,7 +406,7 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
                 yield "the constant load F_0_w is in the buoyancy"
             else:
                 yield f"left out: the constant load {part.coefficient('F_0')}"
-    if missing := [name for name in AXES if name not in layout.by_name]:
+    if missing := layout.lacking:
         yield f"the vehicle file has no {', '.join(missing)}: damping holds it there, in rotation with a large inertia"
     if not layout.has_attitude:
         yield "thrusters stand where their force has no moment in roll and pitch"

@@ -59,7 +59,7 @@ def _notes(vehicle: Vehicle) -> Iterator[str]:
     yield from (f"left out: {words}" for words in left_out(layout, _IN_URDF))
     if any(vehicle[part.axis.coefficient("beta")] != 1.0 for part in layout.axes):
         yield "beta: the added mass is that of the effective inertia, (m + m_a) / beta less the mass"
-    if missing := [name for name in AXES if name not in layout.by_name]:
+    if missing := layout.lacking:
         yield f"the vehicle file has no {', '.join(missing)}: no added mass and no drag there"
     if any(key.endswith(REVERSE) for part in layout.axes for key in part.keys):
         yield "drag has the mean of both directions"

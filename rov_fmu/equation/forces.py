@@ -240,10 +240,10 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
     The third row of the rotation matrix is k, which points down.
     """
     if layout.restoring and layout.has_attitude:
-        k = [Name(entry(3, n)) for n in (1, 2, 3)]
+        down = rotation(layout)[2]
         weight, arm = _net_weight(layout, names)
         yield from (
-            Force(RESTORING, v, formula) for v, formula in _load_along(k, weight, arm) if v in layout.by_velocity
+            Force(RESTORING, v, formula) for v, formula in _load_along(down, weight, arm) if v in layout.by_velocity
         )
 
 
@@ -346,8 +346,7 @@ def _buoyancy(layout: Layout, names: Names) -> Iterator[tuple[str, Expression]]:
         yield HEAVE.velocity, -B
         return
     arm = {x: B * Name(f"{x}_B") for x in "xyz" if f"{x}_B" in layout.restoring}
-    k = [Name(entry(3, n)) for n in (1, 2, 3)]
-    yield from ((v, -formula) for v, formula in _load_along(k, B, arm))
+    yield from ((v, -formula) for v, formula in _load_along(rotation(layout)[2], B, arm))
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:

@@ -20,6 +20,7 @@ from .catalogue import (
     ANGLES_AT_START,
     ARM,
     ATTITUDE,
+    AXES,
     AXIS,
     BODY,
     COMMANDS,
@@ -197,6 +198,11 @@ class Layout:
     def curve_of(self) -> dict[str, Curve]:
         """The curve of each thruster, by its name."""
         return {thruster.name: self.curves_by_name[thruster.curve] for thruster in self.thrusters}
+
+    @property
+    def lacking(self) -> list[str]:
+        """The names of the axes that the vehicle does not have."""
+        return [name for name in AXES if name not in self.by_name]
 
     def has(self, *axes: Axis) -> bool:
         """Return True when the vehicle has one of these axes."""

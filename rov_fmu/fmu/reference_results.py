@@ -245,7 +245,7 @@ def _fastest_rate(vehicle: Vehicle, inputs: Values) -> float:
     layout, root, steady, rates = vehicle.layout, dict[str, float](), dict[str, float](), [1.0 / _LONGEST_TAU]
     for part, motion in zip(layout.axes, vehicle.motions(inputs), strict=True):
         v, V = part.axis.velocity, motion.steady_velocity()
-        root[v], steady[v] = sqrt(vehicle.effective_inertia(part)), V if isfinite(V) else 0.0
+        root[v], steady[v] = sqrt(vehicle.effective_inertia(part.axis)), V if isfinite(V) else 0.0
         if part.axis.is_rotation:
             rates += [sqrt(abs(motion.C)), abs(steady[v])]
     state = {**layout.at_rest, **steady}

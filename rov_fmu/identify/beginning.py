@@ -381,7 +381,7 @@ def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> flo
             slower = -changes(time, np.abs(speeds)) / changes(time, time)
             largest = max(largest, float(np.max(slower, initial=0.0)))
     is_whole = axis.coefficient("m_a") in vehicle.coefficients
-    return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.by_name[axis.name]) * largest
+    return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(axis) * largest
 
 
 def table_rows(tests: Tests, layout: Layout) -> Iterator[tuple[TableRow, str, bool]]:

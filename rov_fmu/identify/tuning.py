@@ -121,13 +121,13 @@ def _thrust(vehicle: Vehicle, axis: Axis, command: float, V: float) -> float:
     """
     plain = vehicle.with_(**{axis.coefficient(kind): 1.0 for kind in TUNING})
     lost = plain.motion_at(axis, command).B - plain.motion_at(axis, 0.0).B
-    return vehicle.force(axis, command) - plain.effective_inertia(vehicle.layout.by_name[axis.name]) * lost * V
+    return vehicle.force(axis, command) - plain.effective_inertia(axis) * lost * V
 
 
 def _holding(vehicle: Vehicle, axis: Axis, V: float) -> float:
     """Return the thrust that balances drag and constant load at a velocity: a_d V^2 + b_d V = α (F - L V) + F_0."""
     plain, form = vehicle.with_(**{axis.coefficient("beta"): 1.0}), vehicle.layout.by_name[axis.name]
-    return -plain.effective_inertia(form) * plain.motion_at(axis, 0.0).acceleration(V)
+    return -plain.effective_inertia(form.axis) * plain.motion_at(axis, 0.0).acceleration(V)
 
 
 def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:

@@ -325,5 +325,5 @@ def most_inertia(vehicle: Vehicle, axis: Axis, beta: IdentifiedCoefficient | Non
     """Return the largest effective inertia by the interval of β, relative to the inertia in air; inf if unknown."""
     if beta is None or beta.interval is None:
         return inf
-    effective = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
+    effective = vehicle.effective_inertia(axis)
     return effective * beta.value / beta.interval[0] / vehicle[axis.inertia]

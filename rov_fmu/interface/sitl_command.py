@@ -161,7 +161,7 @@ def _floats(setup: Setup) -> str:
     stepper = Stepper(vehicle, setup.start, ["z"])
     (start,), (end,) = stepper.recorded(), stepper.step([], _WITHOUT_POSITION)
     weight = vehicle.alone(HEAVE, {**layout.usual_inputs, **setup.start}).C
-    weight *= vehicle.effective_inertia(layout.by_name[HEAVE.name])
+    weight *= vehicle.effective_inertia(HEAVE)
     if weight >= 0.0 or start - end < _FAR:
         return ""
     return (

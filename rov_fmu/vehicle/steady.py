@@ -44,7 +44,7 @@ def steady_at(vehicle: Vehicle, axis: Axis, command: float, inputs: Mapping[str,
     held = {**vehicle.held_inputs(axis, command), **inputs}
     velocity = vehicle.alone(axis, held).steady_velocity()
     coasting = vehicle.alone(axis, {**vehicle.held_inputs(axis, 0.0), **inputs})
-    inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
+    inertia = vehicle.effective_inertia(axis)
     thrust = -inertia * coasting.acceleration(velocity) if isfinite(velocity) else velocity
     layout = vehicle.layout
     power = vehicle.calculated(held, layout.at_rest)["electric_power"] if layout.electric else None

@@ -16,7 +16,7 @@ from rov_fmu.equation.alone import AxisAlone, alone_formulas
 from rov_fmu.equation.catalogue import ARM, YAW, Axis
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
+from rov_fmu.equation.parts import Curve, Thruster, arm
 from rov_fmu.equation.python.printed import printed_model
 from rov_fmu.equation.python.step import Memory, heading, step
 from rov_fmu.equation.terms import equation_of
@@ -393,9 +393,9 @@ class Vehicle:
 
     # ---- One axis alone ----
 
-    def effective_inertia(self, vehicle_axis: VehicleAxis) -> float:
+    def effective_inertia(self, axis: Axis) -> float:
         """Return the effective inertia m/β (kg, kg.m2): the load per acceleration along an axis alone."""
-        gain = self.parameters[self._formulas.names("gain", vehicle_axis.axis.velocity).identifier]
+        gain = self.parameters[self._formulas.names("gain", axis.velocity).identifier]
         return 1.0 / gain if gain > 0.0 else inf
 
     def alone(self, axis: Axis, inputs: Values) -> AxisAlone:

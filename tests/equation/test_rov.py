@@ -90,9 +90,8 @@ def test_at_rest_only_a_net_weight_and_the_place_of_the_mass_matter_and_not_the_
 
 def _loss(rov: Vehicle, axis: Axis, inputs: dict[str, float]) -> float:
     """Return what an axis alone loses of its thrust per velocity, before α, from its damping."""
-    form = rov.layout.by_name[axis.name]
     more = rov.alone(axis, inputs).B - rov.alone(axis, held(rov)).B
-    return more * rov.effective_inertia(form) / rov[axis.coefficient("alpha")]
+    return more * rov.effective_inertia(axis) / rov[axis.coefficient("alpha")]
 
 
 def test_the_loss_of_thrust_is_that_of_the_thrusters_parts_along_the_axis() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.equation.catalogue import SURGE, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.vehicle.schema import NOT_GIVEN
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -48,12 +48,7 @@ def test_a_turn_pushes_ahead_where_thrust_astern_is_weaker(vehicle: Vehicle) -> 
     assert axis is SURGE
     assert push == pytest.approx(0.25 * vehicle.force(SURGE, 0.5))
     assert [*weaker(0.999).side_effects(YAW, 0.5), *vehicle.side_effects(SURGE, 0.5)] == []
-    assert (
-        replace(vehicle, coefficients={**vehicle.coefficients, "beta_w": 0.0}).effective_inertia(
-            vehicle.layout.by_name["heave"]
-        )
-        == inf
-    )
+    assert replace(vehicle, coefficients={**vehicle.coefficients, "beta_w": 0.0}).effective_inertia(HEAVE) == inf
 
 
 def refusal(path: Path) -> str:

@@ -145,7 +145,7 @@ def _own_fluid(vehicle: Vehicle, model: Any) -> tuple[float, float]:
     data = mujoco.MjData(model)
     data.xfrc_applied[1, 0] = _PUSH
     mujoco.mj_forward(model, data)
-    quick = data.qacc[0] * vehicle.effective_inertia(vehicle.layout.by_name["surge"]) / _PUSH
+    quick = data.qacc[0] * vehicle.effective_inertia(SURGE) / _PUSH
     data.xfrc_applied[1, 0] = vehicle.force(SURGE, 0.3) * vehicle["alpha_u"]
     for _ in range(round(20.0 / H)):
         mujoco.mj_step(model, data)

@@ -187,7 +187,7 @@ def _strength(vehicle: Vehicle, mixer: Mixer, axis: Axis) -> float:
 
 def _rule(vehicle: Vehicle, mixer: Mixer, axis: Axis, share: float) -> dict[str, tuple[float, str]]:
     """Return the gains of an axis with their reasons: a share of those of the rule."""
-    inertia, k = vehicle.effective_inertia(vehicle.layout.by_name[axis.name]), _strength(vehicle, mixer, axis)
+    inertia, k = vehicle.effective_inertia(axis), _strength(vehicle, mixer, axis)
     curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(axis)}
     lag = max(vehicle[curve.coefficient("T")] for curve in curves)
     lowered = f"; {share:.0%} of it, so that it does not chatter" if share < 1.0 else ""

@@ -28,7 +28,7 @@ from rov_fmu.c.compile import (
     processor,
 )
 from rov_fmu.c.library import load_sources
-from rov_fmu.equation.catalogue import AXES, UPWARD
+from rov_fmu.equation.catalogue import UPWARD
 from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
@@ -219,7 +219,7 @@ def _notes(vehicle: Vehicle) -> list[str]:
         "Steps of `Euler`, `implicit` or `implicitfast` are taken; with `RK4`, those of `Euler`",
         "The water has no surface and no waves",
     ]
-    if lacking := [name for name in AXES if name not in layout.by_name]:
+    if lacking := layout.lacking:
         notes.append(
             f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "
             "times its mass"

@@ -200,7 +200,7 @@ def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> It
     for axis in known.fitted:
         index = objective.table.index(INERTIA, axis.name)
         if index is not None and not axis.is_rotation:
-            inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
+            inertia = vehicle.effective_inertia(axis)
             yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[index]), _WEIGHED)
 
 

@@ -37,7 +37,7 @@ from rov_fmu.report.plots.steps import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes
+from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes, shade
 from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.steady import speed_table
@@ -215,9 +215,9 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     factor, unit = in_degrees(axis.unit)
     least = -100 if differs_by_direction(vehicle, axis) else 0
     if (low, ahead) != (0.0, 100.0):
-        ax.axvspan(low, max(low, ahead), label="valid commands", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+        shade(ax, low, max(low, ahead), "valid commands")
         if least:
-            ax.axvspan(min(astern, -low), -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+            shade(ax, min(astern, -low), -low)
     commands = range(least, 101, 2)
     models = [("tuned", vehicle, "blue", "-")]
     if _is_tuned(vehicle):

@@ -14,7 +14,7 @@ from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
 from rov_fmu.equation.units import in_degrees
-from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes
+from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes, shade
 from rov_fmu.report.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -84,7 +84,7 @@ def draw_curve(ax: Axes, vehicle: Vehicle, curve: Curve) -> None:
         ends = -vehicle[curve.coefficient("c_0_reverse")], vehicle[curve.coefficient("c_0")]
         commands |= set(ends)
         low, high = (100.0 * end for end in ends)
-        ax.axvspan(low, high, label="dead band", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+        shade(ax, low, high, "dead band")
     c = sorted(commands)
     ax.plot([100.0 * x for x in c], [vehicle.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
     name_axes(ax, f"thrust, curve {curve.name}", "N", "command (%)")

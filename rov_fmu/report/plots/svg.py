@@ -119,6 +119,11 @@ def add_knots(ax: Axes, along: Literal["x", "y"], gap: float = 0.0) -> None:
     axis.set_major_locator(MaxNLocator(5))
 
 
+def shade(ax: Axes, low: float, high: float, label: str | None = None) -> None:
+    """Shade a panel between two places."""
+    ax.axvspan(low, high, label=label, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+
+
 def add_legend(figure: Figure, columns: int = 2) -> None:
     """Add one legend for all panels below them, where it hides nothing, if a line or an area has a name."""
     named = {label: look for ax in figure.axes for look, label in zip(*ax.get_legend_handles_labels(), strict=True)}

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from rov_fmu.report.plots.steps import evenly
-from rov_fmu.report.plots.svg import LIGHT, LINES, inline_svg, with_even_text, with_formulas
+from rov_fmu.report.plots.svg import LIGHT, LINES, inline_svg, shade, with_even_text, with_formulas
 from rov_fmu.report.templates import number, with_unit
 from rov_fmu.study.results.results import Results
 
@@ -39,7 +39,7 @@ def distribution(name: str, values: Any, quantiles: list[float], unit: str, expr
     low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
 
     def draw(ax: Axes) -> None:
-        ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+        shade(ax, low, high)
         shares = np.full(len(values), 100.0 / len(values))
         bins = min(_BINS, max(5, round(len(values) ** 0.5)))
         _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)

@@ -105,12 +105,12 @@ def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> N
         with_fin, without = (NOW.derivatives(inputs | {"u_rudder": c}, state) for c in (command, 0.0))
         return {name: with_fin[name] - without[name] for name in ("u", "v", "r")}
 
-    m, I_r = (NOW.effective_inertia(NOW.layout.by_name[axis.name]) for axis in (SWAY, YAW))
+    m, I_r = (NOW.effective_inertia(axis) for axis in (SWAY, YAW))
     angle = 0.4 * 0.5
     ahead = effect(2.0, 0.5)
     assert ahead["v"] == pytest.approx(9.0 * angle * 4.0 / m, rel=1e-13)
     assert ahead["r"] == pytest.approx(-0.6 * 9.0 * angle * 4.0 / I_r, rel=1e-13)
-    surge = NOW.effective_inertia(NOW.layout.by_name[SURGE.name])
+    surge = NOW.effective_inertia(SURGE)
     assert ahead["u"] == pytest.approx(-4.0 * angle**2 * 4.0 / surge, rel=1e-12)
     assert effect(-2.0, 0.5) == pytest.approx({name: -x for name, x in ahead.items()}, rel=1e-12)
     assert effect(2.0, 5.0) == effect(2.0, 1.0)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.words import LEFT_WATER
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle, without_surface
@@ -105,7 +106,7 @@ def test_a_jump_passes_the_height_above_which_nothing_lifts() -> None:
     assert z.min() < -0.25
     assert z[-1] > z.min()
     falling = LEVEL.derivatives(still(LEVEL) | {"u_5": 1.0, "u_1": 1.0}, at_rest(LEVEL) | {"z": -1.0})
-    assert falling["w"] * LEVEL.effective_inertia(LEVEL.layout.by_name["heave"]) == pytest.approx(G * LEVEL["m_rov"])
+    assert falling["w"] * LEVEL.effective_inertia(HEAVE) == pytest.approx(G * LEVEL["m_rov"])
     assert falling["u"] == pytest.approx(0.0, abs=1e-12)
     assert np.isfinite(rate).all()
 
