@@ -1,7 +1,8 @@
 """The connections of a system: from names in a plan to pairs of variables, with every check."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import dropwhile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 
 from rov_fmu.bridges.system.part import Part
@@ -19,6 +20,18 @@ class Connection(NamedTuple):
     end: tuple[str, str]
     factor: float = 1.0
     """By what the value is multiplied on its way."""
+
+
+@dataclass(frozen=True)
+class SystemStructure:
+    """The FMUs of a system, and what connects them."""
+
+    parts: dict[str, Part]
+    values: dict[str, dict[str, Value]]
+    """The start values of each component."""
+    connections: list[Connection]
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """The paths of the FMUs in the archive that was read."""
 
 
 class MismatchError(RovError, ValueError):
@@ -108,14 +121,12 @@ DIFFERENCE = "difference_{}"
 _FORCES = ("F_N", "F_E", "F_D")
 
 
-def halves(
-    connections: Sequence[Connection], parts: Mapping[str, Part], values: Mapping[str, Mapping[str, Value]]
-) -> Iterator[tuple[str, str, str]]:
+def halves(system: SystemStructure) -> Iterator[tuple[str, str, str]]:
     """Yield the component, the port and the input, as component.variable, for each port that is connected by half.
 
     Place and velocity of a point belong together, and so do its motion and the force on it, where both sides have them.
     """
-    ends = {one.end for one in connections}
+    parts, ends = system.parts, {one.end for one in system.connections}
     ports = {
         (component, port): names
         for component, part in parts.items()
@@ -129,7 +140,11 @@ def halves(
             if member in ports[sides[1]] and member not in VELOCITIES.values():
                 both = [(component, ports[component, port][member]) for component, port in sides]
                 inputs = [(c, name) for c, name in both if parts[c].variables[name].causality == "input"]
-                if len(inputs) == 1 and inputs[0] not in ends and inputs[0][1] not in values.get(inputs[0][0], {}):
+                if (
+                    len(inputs) == 1
+                    and inputs[0] not in ends
+                    and inputs[0][1] not in system.values.get(inputs[0][0], {})
+                ):
                     return ".".join(inputs[0])
         return ""
 
@@ -145,7 +160,7 @@ def halves(
         for (component, port), names in ports.items()
         for member, name in names.items()
     )
-    for one in connections:
+    for one in system.connections:
         lacks = [
             lacking((one.start[0], first), (one.end[0], second))
             for first, member in members.get(one.start, ())
@@ -156,32 +171,20 @@ def halves(
             yield one.end[0], members[one.end][0][0], lacks[0]
 
 
-def loop(connections: Sequence[Connection], parts: Mapping[str, Part]) -> list[str]:
+def loop(system: SystemStructure) -> list[str]:
     """Return the variables around a loop in which each output follows its input at once; none if there is no loop.
 
     In such a loop, the values at one time depend on themselves. A master that passes on the outputs of the step before
     would solve other equations, with a delay that may make them unstable, so a system must have none.
     """
-    nexts: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for one in connections:
-        nexts.setdefault(one.start, []).append(one.end)
-    for component, part in parts.items():
+    links = TopologicalSorter[tuple[str, str]]()
+    for one in system.connections:
+        links.add(one.end, one.start)
+    for component, part in system.parts.items():
         for output, inputs in part.direct.items():
-            for name in inputs:
-                nexts.setdefault((component, name), []).append((component, output))
-    done: set[tuple[str, str]] = set()
-    for first in nexts:
-        way: dict[tuple[str, str], None] = {}
-        left: list[Iterator[tuple[str, str]]] = [iter([first])]
-        while left:
-            node = next(left[-1], None)
-            if node is None:
-                left.pop()
-                if way:
-                    done.add(way.popitem()[0])
-            elif node in way:
-                return [".".join(one) for one in [*dropwhile(node.__ne__, way), node]]
-            elif node not in done:
-                way[node] = None
-                left.append(iter(nexts.get(node, ())))
+            links.add((component, output), *((component, name) for name in inputs))
+    try:
+        links.prepare()
+    except CycleError as error:
+        return [".".join(one) for one in error.args[1]]
     return []

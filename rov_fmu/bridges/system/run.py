@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
-from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmus.description import TIME_LIMIT, budget
 from rov_fmu.fmus.instance import Array, RunError

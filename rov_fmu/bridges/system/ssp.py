@@ -10,7 +10,7 @@ from typing import Any
 
 from lxml import etree
 
-from rov_fmu.bridges.system.connections import Connection, checked_connection
+from rov_fmu.bridges.system.connections import Connection, SystemStructure, checked_connection
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmus.unpacking import unpack_fmu
@@ -109,18 +109,6 @@ def _rendered(template: str, **content: Component | System) -> str:
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class SystemStructure:
-    """A system that was read."""
-
-    parts: Mapping[str, Part]
-    values: Mapping[str, Mapping[str, Value]]
-    """The start values of each component."""
-    connections: Sequence[Connection]
-    sources: Mapping[str, str] = field(default_factory=dict)
-    """The paths of the FMUs in the archive that was read."""
 
 
 def read_ssp(path: Path) -> SystemStructure:

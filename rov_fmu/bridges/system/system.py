@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -20,13 +20,14 @@ from rov_fmu.bridges.system.connections import (
     VELOCITIES,
     Connection,
     MismatchError,
+    SystemStructure,
     connected,
     halves,
     loop,
 )
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
-from rov_fmu.bridges.system.ssp import Component, System, SystemStructure
+from rov_fmu.bridges.system.ssp import Component, System
 from rov_fmu.build import build_fmu
 from rov_fmu.c.compile import compiler_identity, host_platform
 from rov_fmu.equation.catalogue import before_name
@@ -65,28 +66,25 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         raise SystemPlanError(*lines_on(path, wrong))
     served, lines = _served(plan)
     parts, vehicles = _parts(plan, path, served, on_part)
-    values: dict[str, dict[str, Value]] = {}
-    wrong += _set_values(plan, path, parts, values)
-    connections = list[Connection]()
-    wrong += _connect(plan, lines, parts, connections)
+    system = SystemStructure(parts, {}, [])
+    wrong += _set_values(plan, path, system)
+    wrong += _connect(plan, lines, system)
     if not wrong:
-        connections += _depths(served, parts, values, connections)
-        wrong += _seabeds(parts, values, connections)
-        wrong += _differences(parts, values, connections)
-        wrong += _waves_that_pass(plan, parts, connections)
-    if not wrong and (around := loop(connections, parts)):
+        system.connections.extend([*_depths(served, system)])
+        wrong += [*_seabeds(system), *_differences(system), *_waves_that_pass(plan, system)]
+    if not wrong and (around := loop(system)):
         reason = "is a loop without delay, for each output follows its input at once: put an FMU with a state into it"
         wrong.append(f"connect: {' -> '.join(around)} {reason}")
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
-    _pass_on(connections, parts, values)
+    _pass_on(system)
     for name, vehicle in vehicles.items():
         on_part(f"{name}, the FMU of {vehicle.name}")
         described = parts[name]
         built = replace(described, content=_built(vehicle))
         parts |= {other: built for other, part in parts.items() if part is described}
         _check_size(parts, name, path)
-    return SystemStructure(parts, values, connections)
+    return system
 
 
 def _parts(
@@ -263,12 +261,10 @@ def _built(vehicle: Vehicle) -> bytes:
         return make()
 
 
-def _set_values(
-    plan: SystemPlan, path: Path, parts: Mapping[str, Part], values: dict[str, dict[str, Value]]
-) -> Iterator[str]:
+def _set_values(plan: SystemPlan, path: Path, system: SystemStructure) -> Iterator[str]:
     """Fill in the start values, and yield a line for each that does not fit."""
     for name, table in plan.component.items():
-        values[name] = {}
+        part, values = system.parts[name], system.values.setdefault(name, {})
         key = f"component.{name}"
         given: dict[str, tuple[str, Value]] = {}
         if table.coefficients:
@@ -278,17 +274,16 @@ def _set_values(
         given |= {one: (f"{key}.start.{one}", value) for one, value in table.start.items()}
         for one, (where, value) in given.items():
             try:
-                values[name][one] = parts[name].start_value(one, value)
+                values[one] = part.start_value(one, value)
             except ValueError as error:
                 yield key_line(where, str(error), value)
-        if table.companion and "step" in parts[name].variables:
-            values[name].setdefault("step", plan.step)
+        if table.companion and "step" in part.variables:
+            values.setdefault("step", plan.step)
 
 
-def _connect(
-    plan: SystemPlan, lines: Sequence[Sequence[_Line]], parts: Mapping[str, Part], connections: list[Connection]
-) -> Iterator[str]:
+def _connect(plan: SystemPlan, lines: Sequence[Sequence[_Line]], system: SystemStructure) -> Iterator[str]:
     """Fill in the connections of some lines, and yield a line of the plan for each that does not fit."""
+    parts = system.parts
     taken: dict[tuple[str, str], int] = {}
     for n, (given, some) in enumerate(zip(plan.connect, lines, strict=True), 1):
         try:
@@ -302,54 +297,47 @@ def _connect(
         except MismatchError as error:
             yield key_line(f"connect#{n}", str(error), [*given[:2]])
             continue
-        connections += found
+        system.connections.extend(found)
     for component, name in plan.plotted:
         has = parts[component].variables if component in parts else {}
         if name not in has or has[name].kind == "String":
             yield key_line("plot", "must name variables that are numbers, as component.variable", f"{component}.{name}")
 
 
-def _pass_on(
-    connections: Iterable[Connection], parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]]
-) -> None:
+def _pass_on(system: SystemStructure) -> None:
     """Give connected inputs the start values of their sources, where the plan has these.
 
     Otherwise a current at depth would begin with that at the surface, and jump at the first exchange.
     """
-    for (source, output), (component, name), factor in connections:
+    values = system.values
+    for (source, output), (component, name), factor in system.connections:
         if output in values[source] and name not in values[component]:
             value = values[source][output]
             with suppress(ValueError):  # it is not within the bounds of the input
                 passed = value if factor == 1.0 else factor * float(value)
-                values[component][name] = parts[component].start_value(name, passed)
+                values[component][name] = system.parts[component].start_value(name, passed)
 
 
-def _depths(
-    served: Served,
-    parts: Mapping[str, Part],
-    values: Mapping[str, Mapping[str, Value]],
-    connections: Sequence[Connection],
-) -> Iterator[Connection]:
+def _depths(served: Served, system: SystemStructure) -> Iterator[Connection]:
     """Yield the connections that tell a companion where the vehicles are that it serves, if nothing else tells it."""
-    ends = {one.end for one in connections}
+    parts, ends = system.parts, {one.end for one in system.connections}
     for component, others in served.items():
         for other, suffix in others.items():
             for member, name in parts[component].terminals[f"pose{suffix}"].items():
                 if (
                     (component, name) not in ends
-                    and name not in values[component]
+                    and name not in system.values[component]
                     and member in parts[other].names("output")
                 ):
                     yield Connection((other, member), (component, name))
 
 
-def _seabeds(
-    parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
-) -> Iterator[str]:
+def _seabeds(system: SystemStructure) -> Iterator[str]:
     """Give what moves a tether the seabed that only the tether was told, and yield a line where they differ."""
+    parts, values = system.parts, system.values
     moved = {
         (one.start[0], one.end[0]): None
-        for one in connections
+        for one in system.connections
         for terminal in ("profile", "waves")
         if one.end[1] in parts[one.end[0]].terminals.get(terminal, {}).values()
     }
@@ -361,23 +349,26 @@ def _seabeds(
                 yield key_line(f"component.{tether}.start.seabed", reason, depth)
 
 
-def _differences(
-    parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
-) -> Iterator[str]:
+def _differences(system: SystemStructure) -> Iterator[str]:
     """Have a companion take velocities from places where only these are connected; yield a line for other halves."""
-    for component, port, lacking in halves(connections, parts, values):
+    parts = system.parts
+    for component, port, lacking in halves(system):
         velocities = {f"{component}.{parts[component].terminals[port].get(name)}" for name in VELOCITIES.values()}
         if lacking in velocities and (flag := DIFFERENCE.format(port)) in parts[component].variables:
-            values[component][flag] = True
+            system.values[component][flag] = True
         else:
             yield f"connect: {component}.{port} is connected by half: nothing is connected to {lacking}"
 
 
-def _waves_that_pass(plan: SystemPlan, parts: Mapping[str, Part], connections: Sequence[Connection]) -> Iterator[str]:
+def _waves_that_pass(plan: SystemPlan, system: SystemStructure) -> Iterator[str]:
     """Yield a line for each vehicle in a seaway that keeps its velocity over ground where the water's changes."""
-    for one in connections:
+    for one in system.connections:
         (sea, _), (rov, name) = one.start, one.end
-        if plan.component[sea].companion == "seaway" and name == "V_N" and before_name(name) in parts[rov].variables:
+        if (
+            plan.component[sea].companion == "seaway"
+            and name == "V_N"
+            and before_name(name) in system.parts[rov].variables
+        ):
             reason = 'has current = "passes", which would lose the load of the waves: leave it out'
             yield f"connect: {sea}.current moves {rov}, whose vehicle file {reason}"
 

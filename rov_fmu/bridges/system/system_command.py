@@ -10,11 +10,12 @@ from rich.table import Table
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_model
 from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_of
+from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system, system_csv
-from rov_fmu.bridges.system.ssp import SystemStructure, is_unchanged, ssp_content
+from rov_fmu.bridges.system.ssp import is_unchanged, ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM

@@ -18,11 +18,10 @@ from rov_fmu.bridges.system import run
 from rov_fmu.bridges.system.companion import companion, slave_of, timed_rows
 from rov_fmu.bridges.system.companion import levels_of as levels_of_rows
 from rov_fmu.bridges.system.companions.current import Current
-from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.connections import Connection, SystemStructure
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system
-from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.io.csv_table import DataFileError
