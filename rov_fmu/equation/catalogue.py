@@ -117,6 +117,8 @@ BY_LETTER = {axis.letter: axis for axis in AXES.values()}
 """The same by the letters of their forces and moments."""
 EXTERNAL = frozenset(axis.external for axis in AXES.values())
 """The names of the forces and moments on the body: X_ext ..."""
+_DIRECTIONS = [*zip("xyz", (axis.positive for axis in AXES.values()), strict=False)]
+"""The coordinates in the body frame, each with its direction in words."""
 COUPLED_AXES = (SURGE, SWAY, YAW)
 """The axes that the Coriolis and Munk terms couple in a vehicle without roll and pitch."""
 
@@ -256,7 +258,7 @@ RESTORING = {
             "m", f"Position of the {centre}, {where} {axis}_{symbol}", -100.0, 100.0, needed=False, tunable=True
         )
         for symbol, centre in (("G", "centre of mass"), ("B", "centre of buoyancy"))
-        for axis, where in (("x", "forward"), ("y", "to starboard"), ("z", "down"))
+        for axis, where in _DIRECTIONS
     },
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
@@ -310,7 +312,7 @@ THRUSTER = {
 """The coefficients of a thruster."""
 POINT = {
     f"r_{axis}": Declaration("m", f"Position of the {{point}}, {where} r_{axis}", -100.0, 100.0, tunable=True)
-    for axis, where in (("x", "forward"), ("y", "to starboard"), ("z", "down"))
+    for axis, where in _DIRECTIONS
 }
 """The position of a point at which forces act on the vehicle."""
 CURVE = {

@@ -16,7 +16,7 @@ from rov_fmu.fmus.description import TIME_LIMIT, budget, described, read_descrip
 from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Exchange, Simulation
 from rov_fmu.fmus.unpacking import opened_archive, unpack_fmu
-from rov_fmu.fmus.variable import Variable, variables_of
+from rov_fmu.fmus.variable import Described
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
@@ -28,7 +28,7 @@ _MOST_BYTES = 4_000_000
 
 
 @dataclass(frozen=True)
-class Fmu:
+class Fmu(Described):
     """An FMU of FMI 2.0 or 3.0 for Co-Simulation, or one of ours for Model Exchange alone."""
 
     path: Path
@@ -53,11 +53,6 @@ class Fmu:
         if description.coSimulation is None and not is_ours:
             raise FileError(f"{path}: is not for Co-Simulation")
         return cls(path, content, description)
-
-    @cached_property
-    def variables(self) -> dict[str, Variable]:
-        """The variables that are one number or one text, by name."""
-        return variables_of(self.description)
 
     @cached_property
     def terminals(self) -> Mapping[str, Mapping[str, str]]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.fmus.variable import variables_of
+from rov_fmu.fmus.variable import Described
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import RovError, brief, reason_of
 
@@ -57,7 +57,7 @@ class Table:
     """Sets the variables of the FMU to a row, and returns the status."""
 
 
-class Unpacked:
+class Unpacked(Described):
     """An unpacked FMU in this process, with its variables."""
 
     def __init__(self, folder: str) -> None:
@@ -65,7 +65,6 @@ class Unpacked:
 
         self.folder = folder
         self.description = fmpy.read_model_description(folder, validate=False)
-        self.variables = variables_of(self.description)
 
     def simulated(self, **how: Any) -> Any:
         """Run the FMU by FMPy, whose solver Model Exchange needs, and return its table. It raises what FMPy raises."""

@@ -1,6 +1,7 @@
 """The variables of an FMU, alike for both versions of FMI."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import Any
 
@@ -62,6 +63,25 @@ class Variable:
             unit = f" {self.unit}" * (self.unit not in ("", "1"))
             return f"must be within {self.minimum:.12g} ... {self.maximum:.12g}{unit}"
         return ""
+
+
+class Described:
+    """What has FMPy's description of an FMU."""
+
+    description: Any
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """The variables that are one number or one text, by name."""
+        return variables_of(self.description)
+
+    def names(self, causality: str) -> list[str]:
+        """Return the names of the variables of a causality."""
+        return [name for name, v in self.variables.items() if v.causality == causality]
+
+    def numbers(self, causality: str) -> list[str]:
+        """Return the names of those that are numbers."""
+        return [name for name in self.names(causality) if self.variables[name].kind != "String"]
 
 
 def variables_of(description: Any) -> dict[str, Variable]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rov_fmu.fmus.description import TIME_LIMIT, budget, read_description
 from rov_fmu.fmus.unpacking import unpack_fmu
-from rov_fmu.fmus.variable import Variable, variables_of
+from rov_fmu.fmus.variable import Described
 from rov_fmu.io.child_process import ChildProcess
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
@@ -31,7 +31,7 @@ _TOOL = "rov-fmu "
 
 
 @dataclass(frozen=True)
-class Subject:
+class Subject(Described):
     """An unpacked FMU, and how it is to be proved."""
 
     path: Path
@@ -45,15 +45,6 @@ class Subject:
     tolerance: float | None
     """The relative tolerance of results in place of those of the experiments, or None."""
     time_limit: float
-
-    @cached_property
-    def variables(self) -> dict[str, Variable]:
-        """The variables that are one number or one text, by name."""
-        return variables_of(self.description)
-
-    def numbers(self, causality: str) -> list[str]:
-        """Return the names of the variables of a causality that are numbers."""
-        return [name for name, v in self.variables.items() if v.causality == causality and v.kind != "String"]
 
     @property
     def is_ours(self) -> bool:

@@ -186,5 +186,7 @@ def loop(system: SystemStructure) -> list[str]:
     try:
         links.prepare()
     except CycleError as error:
-        return [".".join(one) for one in error.args[1]]
+        around = error.args[1][1:]
+        first = around.index(next(one.start for one in system.connections if one.start in around))
+        return [".".join(one) for one in (*around[first:], *around[: first + 1])]
     return []

@@ -40,10 +40,6 @@ class Part(Fmu):
             if one.dependencies
         }
 
-    def names(self, causality: str) -> list[str]:
-        """Return the names of the variables of a causality."""
-        return [name for name, v in self.variables.items() if v.causality == causality]
-
     def base(self, name: str) -> tuple[float, ...] | None:
         """Return what the unit of a variable consists of; None where the FMU does not say."""
         base = self._bases.get(self.variables[name].unit)

@@ -46,12 +46,7 @@ class SystemRun(NamedTuple):
 
 def recorded_names(structure: SystemStructure) -> list[Name]:
     """Return all outputs of a system that are numbers."""
-    return [
-        (component, name)
-        for component, part in structure.parts.items()
-        for name in part.names("output")
-        if part.variables[name].kind != "String"
-    ]
+    return [(component, name) for component, part in structure.parts.items() for name in part.numbers("output")]
 
 
 def _members(structure: SystemStructure, end: str) -> set[Name]:

@@ -10,6 +10,7 @@ from rich.table import Table
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_model
 from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_of
+from rov_fmu.bridges.system.companions._common import Variables
 from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
@@ -106,15 +107,14 @@ def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
                 yield from (file, *load_vehicle(file).files)
 
 
-def _autopilot_table() -> Table:
+def _of_autopilot() -> Variables:
     """Return the inputs of the autopilot of the vehicle that ships first, and its gains in depth."""
     model = autopilot_model(autopilot_of(load_vehicle(find_vehicle("videoray"))))
-    title = f"{AUTOPILOT}: {_AUTOPILOT}, here for a VideoRay"
-    shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])
-    for one in model.variables:
-        if one.causality in ("input", "output") or (one.name.endswith("_w") and one.causality == "parameter"):
-            shown.add_row(one.name, f"{one.start or 0.0:g}", one.unit, one.causality, one.description)
-    return shown
+    return {
+        one.name: (one.causality, one.start or 0.0, one.unit, one.description)
+        for one in model.variables
+        if one.causality in ("input", "output") or (one.name.endswith("_w") and one.causality == "parameter")
+    }
 
 
 def companions() -> dict[str, str]:
@@ -125,17 +125,16 @@ def companions() -> dict[str, str]:
 def list_companions() -> None:
     """Print the companions with their variables."""
     for name, words in companions().items():
-        if name == AUTOPILOT:
-            console.print_table(_autopilot_table())
-            continue
-        slave = slave_of(name)(instance_name=name)
         title = f"{name}: {words}"
-        if reason := lack(name):
-            title += f"; {reason}"
-        groups = [*(terminal for terminal, *_ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
-        if groups:
-            title += f". Terminals: {', '.join(groups)}"
+        if name == AUTOPILOT:
+            title, variables = f"{title}, here for a VideoRay", _of_autopilot()
+        else:
+            slave = slave_of(name)(instance_name=name)
+            variables = slave.variables
+            groups = [*(terminal for terminal, *_ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
+            title += f"; {reason}" if (reason := lack(name)) else ""
+            title += f". Terminals: {', '.join(groups)}" if groups else ""
         shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])
-        for variable, (causality, start, unit, text) in slave.variables.items():
+        for variable, (causality, start, unit, text) in variables.items():
             shown.add_row(variable, f"{start:g}", unit, causality, text)
         console.print_table(shown)

@@ -10,7 +10,7 @@ from fmpy.ssp.ssd import read_ssd
 
 from rov_fmu.bridges.system import companion as companions
 from rov_fmu.bridges.system import system
-from rov_fmu.bridges.system.connections import MismatchError, connected, loop
+from rov_fmu.bridges.system.connections import MismatchError, SystemStructure, connected, loop
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
@@ -374,8 +374,9 @@ def test_units_are_alike_if_they_are_the_same_quantity() -> None:
 def test_a_loop_with_a_delay_is_allowed() -> None:
     has = parts(a=foreign(), b=foreign(), late=foreign(follows=False))
     around = [connected(f"{x}.y", f"{y}.u", 1.0, has)[0] for x, y in (("a", "b"), ("b", "late"), ("late", "a"))]
-    assert loop(around, has) == []
-    assert loop([*around[:1], *connected("b.y", "a.u", 1.0, has)], has) == ["a.y", "b.u", "b.y", "a.u", "a.y"]
+    assert loop(SystemStructure(has, {}, around)) == []
+    closed = [*around[:1], *connected("b.y", "a.u", 1.0, has)]
+    assert loop(SystemStructure(has, {}, closed)) == ["a.y", "b.u", "b.y", "a.u", "a.y"]
 
 
 def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
