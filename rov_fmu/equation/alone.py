@@ -101,15 +101,31 @@ def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
 _closed_form, _stopping = compiled(closed_form()), compiled({"distance": stopping_formula()})
 
 
+def steady_velocity(A: float, B: float, C: float) -> float:
+    """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag.
+
+    - `A`, `B`, `C`: quadratic drag, 1/m (1/rad), linear drag, 1/s, and force, m/s2 (rad/s2), each over the inertia.
+
+        steady_velocity(0.48, 1.43, 0.77)  # m/s
+    """
+    return AxisAlone(A, B, C).steady_velocity()
+
+
+def time_constant(A: float, B: float, C: float) -> float:
+    """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag.
+
+    - `A`, `B`, `C`: those of `steady_velocity`.
+
+        time_constant(0.48, 1.43, 0.77)  # s
+    """
+    return AxisAlone(A, B, C).time_constant()
+
+
 @dataclass(frozen=True)
 class AxisAlone:
-    """The motion of one axis alone under held inputs: v' = C - B v - A |v| v.
-
-    AxisAlone(0.48, 1.43, 0.77).steady_velocity()  # m/s
-    """
+    """The motion of one axis alone under held inputs: v' = C - B v - A |v| v."""
 
     A: float
-    """Quadratic drag over the inertia, 1/m (1/rad); B is the linear one, 1/s, and C the force, m/s2 (rad/s2)."""
     B: float
     C: float
     reverse: tuple[float, float] | None = None
@@ -131,11 +147,11 @@ class AxisAlone:
         return self.C - (B + A * abs(v)) * v
 
     def steady_velocity(self) -> float:
-        """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag."""
+        """Return V_ss."""
         return self._response("V_ss")
 
     def time_constant(self) -> float:
-        """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag."""
+        """Return Tau of (17), from rest."""
         return self._response("Tau")
 
     def _response(self, name: str) -> float:

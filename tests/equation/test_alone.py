@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp
 from scipy.integrate import quad
 
-from rov_fmu.equation.alone import RISE, AxisAlone
+from rov_fmu.equation.alone import RISE, AxisAlone, steady_velocity, time_constant
 from tests.motions import DISTANCE, SMALLEST, VELOCITY, Case, step_alone
 from tests.often import often
 from verification.references.reference import axis, time_to_rest
@@ -88,8 +88,8 @@ DRAGS = [
 
 def test_drag_balances_the_force_at_the_steady_velocity() -> None:
     for A, B, C in DRAGS:
-        V = AxisAlone(A, B, C).steady_velocity()
-        assert AxisAlone(A, B, -C).steady_velocity() == -V
+        V = steady_velocity(A, B, C)
+        assert steady_velocity(A, B, -C) == -V
         with mp.workdps(50):
             # a relative error of V is at most that of the drag (with linear drag alone), and at least half of it
             assert abs((A * mp.mpf(V) + B) * V / C - 1) <= 1e-15, (A, B, C)
@@ -97,10 +97,9 @@ def test_drag_balances_the_force_at_the_steady_velocity() -> None:
 
 def test_after_the_time_constant_the_velocity_is_that_of_17() -> None:
     for A, B, C in DRAGS:
-        alone = AxisAlone(A, B, C)
-        Tau = alone.time_constant()
-        assert AxisAlone(A, B, -C).time_constant() == Tau
-        fraction = axis(A, B, C, 0.0, Tau).velocity / alone.steady_velocity()
+        Tau = time_constant(A, B, C)
+        assert time_constant(A, B, -C) == Tau
+        fraction = axis(A, B, C, 0.0, Tau).velocity / steady_velocity(A, B, C)
         assert abs(fraction - (1.0 - 1.0 / e)) <= 1e-15, (A, B, C)
 
 
@@ -118,8 +117,8 @@ def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -
     assert [ahead.acceleration(v) for v in (-2.0, 0.0, 0.5)] == [5.0 + (1.0 + 0.5 * 2.0) * 2.0, 5.0, 5.0 - 2.0]
     assert [ahead.drag(sign) for sign in (-1.0, 0.0, 1.0)] == [(0.5, 1.0), (2.0, 3.0), (2.0, 3.0)]
     assert (ahead.steady_velocity(), astern.steady_velocity()) == (1.0, -1.0)
-    assert ahead.time_constant() == AxisAlone(2.0, 3.0, 5.0).time_constant()
-    assert astern.time_constant() == AxisAlone(0.5, 1.0, -1.5).time_constant()
+    assert ahead.time_constant() == time_constant(2.0, 3.0, 5.0)
+    assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
     assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
     assert astern.stopping_distance(-1.5, 0.1) == pytest.approx(quad(lambda v: 1.0 / (0.5 * v + 1.0), 0.15, 1.5)[0])
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE

@@ -5,7 +5,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from rov_fmu.equation.alone import AxisAlone
+from rov_fmu.equation.alone import steady_velocity
 from tests.motions import (
     BOUNDARIES,
     CASES,
@@ -42,7 +42,7 @@ def for_every(
 @for_every(CASES, st.floats(1.0, 10.0), at=[(case, 2.0) for case in BOUNDARIES])
 def test_the_velocity_approaches_the_steady_one_and_never_passes_it(case: Case, longer: float) -> None:
     A, B, C, v0, h = case
-    V = AxisAlone(A, B, C).steady_velocity()
+    V = steady_velocity(A, B, C)
     early, late = (step_alone(A, B, C, v0, time)[0] for time in (h, h * longer))
     rounding = 2.0 * rounding_of_velocity(v0, early, late)
     low, high = min(v0, V) - rounding, max(v0, V) + rounding
