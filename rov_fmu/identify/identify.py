@@ -35,7 +35,7 @@ from rov_fmu.identify.result import (
     Tested,
 )
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, largest, unknown_forces
-from rov_fmu.identify.unexplained.slips import slips
+from rov_fmu.identify.unexplained.slips import Fits, slips
 from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
@@ -70,11 +70,11 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     if not (known.fitted or known.curves):
         own = ", ".join(sorted(tests.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
-    wrong = tuple[Slip, ...]()
+    wrong, scaled = tuple[Slip, ...](), Fits()
 
     def is_mistaken(objective: Objective, z: Array, errors: Array) -> bool:
         nonlocal wrong
-        found, left = slips(tests, objective, z, errors)
+        found, left = slips(tests, objective, z, errors, {}, scaled)
         wrong = found if left <= ALARM else ()
         return bool(wrong)
 
@@ -93,7 +93,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = wrong or slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts)[0]
+    wrong = wrong or slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts, scaled)[0]
     points = [*points_of(tests, held_out_rows(fit.objective, fit.best), vehicle)]
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(

@@ -16,10 +16,12 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import file_fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.search import StructureSearch
+from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.vehicle import VehicleFileError
@@ -150,7 +152,7 @@ def asked_of(folder: Path, *, may_be_thrusters: bool = False) -> dict[tuple[str,
     tests = load_tests(folder)
     known, recorded, rows = begin(tests)
     objective = Objective.of_known(known, recorded, rows)
-    found, left = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf))
+    found, left = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf), {}, {})
     assert all(one.evidence > KEPT for one in found)
     assert (left == np.inf if may_be_thrusters else left < ALARM) or not found, "the mended logs agree"
     return {(one.file, one.quantity): one.words for one in found}
@@ -163,6 +165,20 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     (log, *_), sensor = recordings(slip.axis), SENSOR[slip.axis.name]
     quantity = "surge distance" if slip.axis is SURGE else sensor
     assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
+
+
+def test_a_second_search_fits_only_the_files_as_they_stand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a fit of scaled channels finds does not depend on the fit to the files as they stand."""
+    (log, *_), counts, fits, made = recordings(HEAVE), list[int](), list[Array](), module.Fits()
+    monkeypatch.setattr(module, "minimise", lambda *some, **how: fits.append(some[1]) or minimise(*some, **how))
+    tests = load_tests(folder_of(write_folder(tmp_path, [slipped(log, SLIPS["heave up"])]), KNOWN, FORCES))
+    objective = Objective.of_known(*begin(tests))
+    for _ in range(2):
+        found, _ = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf), {}, made)
+        assert [one.words for one in found] == [QUESTIONS["heave up"]]
+        counts.append(len(fits))
+    assert counts[0] > 2
+    assert counts[1] == counts[0] + 1
 
 
 def test_a_fit_is_not_refined_where_a_slip_explains_the_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,7 +249,7 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
         return ()
 
     monkeypatch.setattr(module, "_customary", customary)
-    assert slips(tests, objective, z, np.full(len(z), 1e-3)) == ((), np.inf)
+    assert slips(tests, objective, z, np.full(len(z), 1e-3), {}, {}) == ((), np.inf)
     assert tried == [int(is_suspected)]
 
 

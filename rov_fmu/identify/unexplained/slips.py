@@ -22,7 +22,7 @@ knots and feet from metres. These are suspected where the inertia is too small, 
 by such a factor. The scale of commands is checked where they are read.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, inf, log, pi
 
@@ -112,6 +112,8 @@ class _Match:
 
 Scaling = frozenset[tuple[_Match, float]]
 """Channels with their scales."""
+Fits = dict[Hashable, tuple[Objective, Minimum]]
+"""Fits by their scalings and hypotheses, and whether they are quick."""
 
 
 def slips(
@@ -119,7 +121,8 @@ def slips(
     objective: Objective,
     best: Array,
     errors: Array,
-    starts: Starts | None = None,
+    starts: Starts,
+    made: Fits,
 ) -> tuple[tuple[Slip, ...], float]:
     """Return the mistakes that explain the logs much better, and the error R that the best leaves along its axes.
 
@@ -127,6 +130,7 @@ def slips(
 
     `best` is where J is least for the files as they stand, `errors` are the standard errors there, and `starts` has the
     hypotheses about the structure that won. Where several explanations are about as good, each is told for its files.
+    `made` keeps the fits of scaled channels, which do not depend on `best`, for a call with the same hypotheses.
     """
     known = objective.table.known
     compared = [one for n in range(len(objective.logs)) for one in _matches(objective, n, known.guessed)]
@@ -147,21 +151,24 @@ def slips(
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
         unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
-        def promises(end: Minimum, gain: float) -> bool:
-            return is_close(evidence(quick, end) + REST * gain - unlikely)
+        before = fits.get(scaling)
+        key = frozenset((one.file, one.channel, k) for one, k in scaling), frozenset(starts.items()), before is None
+
+        def end() -> tuple[Objective, Minimum]:
+            quick = before[0] if before else applied(_corrected(tests, scaling), starts, thinned=True)
+            z = before[1].z if before else start_of(quick) if start is None else start
+
+            def promises(end: Minimum, gain: float) -> bool:
+                return is_close(evidence(quick, end) + REST * gain - unlikely)
+
+            enough = ENOUGH if before else QUICK
+            return quick, minimise(quick, z, most=most, enough=enough, last=False, promises=promises)
 
         try:
-            if is_exact := scaling in fits:
-                quick, start = fits[scaling][0], fits[scaling][1].z
-            else:
-                quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
-                start = start_of(quick) if start is None else start
-            enough = ENOUGH if is_exact else QUICK
-            end = minimise(quick, start, most=most, enough=enough, last=False, promises=promises)
+            fits[scaling] = made[key] = made[key] if key in made and start is None else end()
         except DivergedError:
             return -inf
-        fits[scaling] = quick, end
-        return evidence(quick, end) - unlikely
+        return evidence(*fits[scaling]) - unlikely
 
     found[as_it_is] = fit(as_it_is, best, 1)
     while untried:  # The best explanation may need fewer channels than it has.
