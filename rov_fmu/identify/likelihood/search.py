@@ -736,7 +736,7 @@ class StructureSearch:
         If one set has won by far, sets whose J falls much less before any fit wait for the next round.
         """
         fits, won = list[StructureFit](), -inf
-        for starts, gain in [*self._promising()]:
+        for starts, gain in sorted(self._promising(), key=lambda one: any(HYPOTHESES[k].is_last for k, _ in one[0])):
             if gain < won - _FAR:
                 continue
             # What explains a model that is wrong along all axes is far better, also on few samples.
