@@ -143,7 +143,7 @@ def fit_all(
     ends = _from_starts(quick, work)
     start = StructureFit({}, quick, ends[0], 0.0, 0.0)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
-    most = _UNREFINED if is_mistake or start.is_hopeless else MOST_STEPS
+    most = _UNREFINED if is_mistake else MOST_STEPS
     work.leave_out(*((HYPOTHESES, REFINED, *SPLINE) if is_mistake else ()))
     near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
     work.fits(full, near)
@@ -156,8 +156,6 @@ def fit_all(
         search.run()
     full, near = search.now.objective, search.now.minimum
     is_wrong = is_mistake or search.now.is_hopeless
-    if search.now is plain and start.is_hopeless and not is_wrong:
-        near = minimise(full, near.z, last=False)
     if first or search.odds:
         work.fits(full, near)
     measured = full.table.known.measured_curves
