@@ -18,8 +18,8 @@ from rov_fmu.fmus.variable import variables_of
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import vehicle_model
 from rov_fmu.study.plan.plan import Plan
-from rov_fmu.study.plan.prepared import Study, prepare
 from rov_fmu.study.plan.sampling import Design
+from rov_fmu.study.plan.study import Study, prepare
 from rov_fmu.study.run.child import Child, simulator
 from rov_fmu.study.run.lanes import runs, simulated
 from rov_fmu.study.run.work import Progress

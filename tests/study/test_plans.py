@@ -13,7 +13,7 @@ from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import load_plan
-from rov_fmu.study.plan.prepared import Study, prepare
+from rov_fmu.study.plan.study import Study, prepare
 from tests.folders import beside
 from tests.io.test_paths import WRONG as WRONG_PATHS
 

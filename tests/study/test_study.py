@@ -25,7 +25,7 @@ from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
-from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store, not_done, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import do_study

@@ -9,7 +9,7 @@ from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
-from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.plan.study import Study
 from rov_fmu.study.run.run import FAILED, Evaluation, Run
 from rov_fmu.study.run.system import SystemModel, SystemSimulator
 

@@ -27,7 +27,7 @@ from distributed.utils import silence_logging_cmgr
 from rov_fmu.fmus.instance import Array, LoadError
 from rov_fmu.io.interrupts import ctrl_c_withheld, temporary_folder
 from rov_fmu.io.messages import FileError, RovError, StudyError, brief, reason_of
-from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.plan.study import Study
 from rov_fmu.study.results.store import Span
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run import Rows, rows_of

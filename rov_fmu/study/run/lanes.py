@@ -17,7 +17,7 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import StudyError
 from rov_fmu.study.plan.figures import Array
 from rov_fmu.study.plan.model import vehicle_fmu
-from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.plan.study import Study
 from rov_fmu.study.run.run import Evaluation, Run, rows_of
 from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from rov_fmu.study.plan.figures import Array, Figures
 from rov_fmu.study.plan.plan import REASON, RUN, STATUS, TIME, TRAJECTORY
-from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.plan.study import Study
 from rov_fmu.study.results.store import parquet
 
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"

@@ -10,7 +10,7 @@ from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
-from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.system import SystemModel, half_step_words, read_system

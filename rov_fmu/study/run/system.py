@@ -24,7 +24,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.study.plan.model import Model
-from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.plan.study import Study
 
 
 @dataclass(frozen=True, kw_only=True)

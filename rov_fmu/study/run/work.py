@@ -6,8 +6,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from threading import Event, Thread
 
-from rov_fmu.study.plan.prepared import Study
 from rov_fmu.study.plan.sampling import Design
+from rov_fmu.study.plan.study import Study
 from rov_fmu.study.results.store import Span, Store
 from rov_fmu.study.run.run import Rows
 

@@ -1,4 +1,4 @@
-"""Combine a plan with its FMU: report what does not fit, and collect what the workers must know."""
+"""A study, which is a plan with its FMU: check that they fit, and collect what the workers must know."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -78,7 +78,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & has.keys()
     angles = ("phi", "theta") if {"phi", "theta", "psi"} <= has.keys() - {*design.names} else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
-    shown = [has[name] for name in (*design.names, *recorded)]
+    told = [has[name] for name in (*design.names, *recorded)]
     about = {
         "runs": design.runs,
         "plan": plan.mark | design.mark,
@@ -88,8 +88,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
         "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
         "model": model.name,
         "title": plan.title,
-        "units": {variable.name: variable.unit or "1" for variable in shown},
-        "descriptions": {variable.name: variable.description for variable in shown},
+        "units": {variable.name: variable.unit or "1" for variable in told},
+        "descriptions": {variable.name: variable.description for variable in told},
         "groups": design.groups,
         "warnings": [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *design.warnings()],
     }
