@@ -9,12 +9,13 @@ each replaces the last one, and get a line each in a pipe.
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from math import exp
 from threading import Event, Lock, Thread
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 from rich.console import RenderableType
 from rich.progress import (
@@ -220,28 +221,19 @@ def compiling() -> Iterator[tuple[Callable[[Sequence[str]], None], Callable[[str
         yield begin, done
 
 
-class StudyProgress(Protocol):
-    """The progress of a study, as rov_fmu/study/run/ reports it."""
+@dataclass(frozen=True)
+class StudyProgress:
+    """The progress of a study, or of a part of it."""
 
-    @property
-    def done(self) -> int:
-        """The number of runs that are done."""
-
-    @property
-    def total(self) -> int:
-        """The number of all runs."""
-
-    @property
-    def failed(self) -> int:
-        """The number of runs that failed."""
-
-    @property
-    def dashboard(self) -> str:
-        """The address of Dask's page about its workers, or nothing."""
-
-    @property
-    def has_workers(self) -> bool:
-        """False while no worker is there."""
+    done: int
+    """The number of runs that are done, including those of earlier calls."""
+    total: int
+    failed: int
+    """The number of runs that failed in this call."""
+    dashboard: str = ""
+    """The address of Dask's page about its workers, or an empty text."""
+    has_workers: bool = True
+    """False while no worker is there, so that nothing is done."""
 
 
 class StudyParts:

@@ -65,6 +65,7 @@ def study_plan(
         words = f"part {part[0]} of {part[1]} is complete: {work.runs} runs now, {work.failed} failed"
         paragraph(console(), f"{shell_words(output)}: {words}")
         return
+    from rov_fmu.interface.model import load
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.results import Results
 
@@ -72,7 +73,9 @@ def study_plan(
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, work.runs, work.elapsed)
     if vehicle and run is not None:
-        content = _motion_of(results, run, named_in(plan, "vehicle", vehicle, PlanError))
+        if not results.outputs or (moved := results.trajectories([run])).empty:
+            raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
+        content = load(named_in(plan, "vehicle", vehicle, PlanError)).to_mcap(moved)
         files |= write_whole(Output(motion, content), force=force)
     print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
@@ -105,12 +108,3 @@ def print_summary(results: "Results", now: int, seconds: float) -> None:
         paragraph(out, f"  {count} runs: {reason}")
     if len(others := reasons[_FAILURES:]):
         paragraph(out, f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page")
-
-
-def _motion_of(results: "Results", run: int, vehicle: Path) -> bytes:
-    """Return the motion of a run as the content of an MCAP file. Raises FileError if the run has no outputs."""
-    from rov_fmu.interface.model import load
-
-    if not results.outputs or (motion := results.trajectories([run])).empty:
-        raise FileError(f"{results.folder}: --mcap {run}: there is no such run with outputs, which [keep] names")
-    return load(vehicle).to_mcap(motion)

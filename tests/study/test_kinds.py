@@ -16,7 +16,7 @@ from distributed import LocalCluster
 
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
-from rov_fmu.study.run.work import Progress
+from rov_fmu.report.progress import StudyProgress
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
@@ -88,11 +88,11 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
 def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were(
     tmp_path: Path, videoray3_fmu: Path, native: Results, cluster: LocalCluster
 ) -> None:
-    progress: list[Progress] = []
+    progress: list[StudyProgress] = []
     plan, address = _plan(tmp_path, videoray3_fmu), cluster.scheduler_address
     same(run_study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native, 1e-11)
     link = cluster.dashboard_link
-    assert [progress[0], progress[-1]] == [Progress(0, RUNS, 0, link), Progress(RUNS, RUNS, 0, link)]
+    assert [progress[0], progress[-1]] == [StudyProgress(0, RUNS, 0, link), StudyProgress(RUNS, RUNS, 0, link)]
     scheduler: Any = cluster.scheduler
     (worker,) = scheduler.workers.values()
     assert not [*Path(worker.local_directory).rglob("modelDescription.xml")]

@@ -16,13 +16,13 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.fmus.variable import variables_of
 from rov_fmu.io.messages import FileError
+from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.plan.model import vehicle_model
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.plan.study import Study, prepare
 from rov_fmu.study.run.child import Child, simulator
 from rov_fmu.study.run.lanes import runs, simulated
-from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.often import spread
@@ -161,7 +161,7 @@ def test_two_parts_run_beside_each_other(tmp_path: Path) -> None:
     plan, folder = _plan(tmp_path), tmp_path / "results"
     whole = run_study(plan, tmp_path / "whole")
 
-    def beside(_: Progress) -> None:
+    def beside(_: StudyProgress) -> None:
         with pytest.raises(FileError, match="another study is writing there"):
             run_study(plan, folder, part=(1, 2))
         run_study(plan, folder, part=(2, 2))
@@ -173,11 +173,11 @@ def test_two_parts_run_beside_each_other(tmp_path: Path) -> None:
 def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, progress = _plan(tmp_path), list[Progress]()
+    plan, progress = _plan(tmp_path), list[StudyProgress]()
     whole = run_study(plan, tmp_path / "whole")
     monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 7)
 
-    def interrupt(now: Progress) -> None:
+    def interrupt(now: StudyProgress) -> None:
         progress.append(now)
         if now.done == 21:
             raise KeyboardInterrupt

@@ -23,13 +23,13 @@ from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import WriteError
+from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store, not_done, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import do_study
-from rov_fmu.study.run.work import Progress
 from tests.commands import start, without_progress
 from tests.folders import beside
 from tests.study.conftest import same
@@ -129,7 +129,7 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     do: Callable[..., Results],
 ) -> None:
-    progress: list[Progress] = []
+    progress: list[StudyProgress] = []
     modes = "mode.values = [0, 1, 6, 7, 8, 9]"
     results = do(runs=30, vary=modes, more='bad = "1/(mode - mode)"', on_progress=progress.append)
     warns = results.runs["mode"].isin([0, 9])
@@ -183,7 +183,7 @@ def test_more_runs_of_the_same_plan_go_on_and_fewer_are_refused(
     foreign: Foreign, tmp_path: Path, whole: Results, do: Callable[..., Results], capsys: pytest.CaptureFixture[str]
 ) -> None:
     results = do(runs=24).folder
-    progress: list[Progress] = []
+    progress: list[StudyProgress] = []
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
     draft = results / "runs" / ".part-000000030-000000039.parquet.abc.part"
     draft.write_bytes(b"of a process that was killed")
@@ -409,10 +409,10 @@ def test_a_scheduler_without_workers_is_told_and_its_workers_are_waited_for(
 ) -> None:
     monkeypatch.setattr("rov_fmu.study.run.work._WATCH", 0.05)
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 0.1)
-    told = list[Progress]()
+    told = list[StudyProgress]()
     with LocalCluster(n_workers=0, processes=False, threads_per_worker=1, dashboard_address="127.0.0.1:0") as late:
 
-        def start_one(now: Progress) -> None:
+        def start_one(now: StudyProgress) -> None:
             if not now.has_workers and not any(before.has_workers is False for before in told):
                 late.scale(1)
             told.append(now)
@@ -484,7 +484,7 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
 
-        def close(now: Progress) -> None:
+        def close(now: StudyProgress) -> None:
             if now.done:
                 cluster.close()
                 time.sleep(5.0)  # until the client has given up the scheduler

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Literal
 
 from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError
+from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
 from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.system import SystemModel, half_step_words, read_system
-from rov_fmu.study.run.work import Progress, Work
+from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -33,7 +34,7 @@ def run_study(
     engine: Engine | None = None,
     part: tuple[int, int] | None = None,
     merge: bool = False,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    on_progress: Callable[[StudyProgress], None] = lambda _: None,
 ) -> "Results":
     """Do the missing runs of a study, and open its results.
 
@@ -66,7 +67,7 @@ def do_study(
     folder: Path,
     workers: int | None,
     scheduler: str | None,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    on_progress: Callable[[StudyProgress], None] = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
     *,
     engine: Engine | None = None,

@@ -3,9 +3,9 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from threading import Event, Thread
 
+from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.plan.study import Study
 from rov_fmu.study.results.store import Span, Store
@@ -13,21 +13,6 @@ from rov_fmu.study.run.run import Rows
 
 _WATCH = 2.0
 """The progress is reported at least every so many seconds."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The progress of a study, or of a part of it."""
-
-    done: int
-    """The number of runs that are done, including those of earlier calls."""
-    total: int
-    failed: int
-    """The number of runs that failed in this call."""
-    dashboard: str = ""
-    """The address of Dask's page about its workers, or an empty text."""
-    has_workers: bool = True
-    """False while no worker is there, so that nothing is done."""
 
 
 class Work:
@@ -49,7 +34,7 @@ class Work:
         store: Store,
         missing: Iterable[Span],
         total: int,
-        on_progress: Callable[[Progress], None],
+        on_progress: Callable[[StudyProgress], None],
     ) -> None:
         """`total` is the number of runs with those that are done."""
         self.study, self.design, self.store = study, design, store
@@ -79,7 +64,7 @@ class Work:
     def report(self, *, has_workers: bool = True) -> None:
         """Tell the progress."""
         self._on_progress(
-            Progress(self._done_before + self.runs, self._total, self.failed, self.dashboard, has_workers)
+            StudyProgress(self._done_before + self.runs, self._total, self.failed, self.dashboard, has_workers)
         )
 
     @contextmanager
