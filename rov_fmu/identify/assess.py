@@ -25,10 +25,8 @@ _EXPONENT = 0.15
 of the command and the velocity that are known to about a tenth each."""
 _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
-EXACT = 0.01
-"""No answer is claimed to better than 1 %, also if nothing that determines it is fitted."""
 ROCKING = CONSTANTS["rocking"].value
-"""Nor is a V_ss to better than this where the vehicle may have rocked unseen."""
+"""No V_ss is claimed to better than this where the vehicle may have rocked unseen."""
 _STOPPED = 0.1
 _GRID = np.linspace(0.0, 1.0, 101)
 """The commands among which the one is found that holds a speed."""
@@ -142,7 +140,7 @@ def answers(
     tested: Tested,
     commands: Sequence[float] = COMMANDS,
     pushes: Sequence[float] = (),
-    least: float = EXACT,
+    least: float = 0.0,
     speeds: Mapping[str, float] | None = None,
 ) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for some commands of an axis.
@@ -162,9 +160,7 @@ def answers(
     of_file = _responses_of(vehicle, NO_SHAPES, axis, commands, pushes, with_lag=with_lag)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-    narrowest = np.array([least, EXACT, EXACT, EXACT])[: own.shape[1]]
-    beyond = beyond_tests(pushes or commands, tested) ** 2
-    ends = [own - narrowest, own + narrowest]
+    beyond, ends = beyond_tests(pushes or commands, tested) ** 2, list[Array]()
     of_table = partial(logarithms, axis=axis, commands=commands, pushes=pushes, with_lag=with_lag)
 
     def fitted(table: Table, z: Array) -> Array:
@@ -178,7 +174,8 @@ def answers(
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
         variances += beyond[:, None]
-        half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
+        half = np.minimum(QUANTILE * np.sqrt(variances), _WIDEST_HALF)
+        half[:, 0] = np.maximum(half[:, 0], least)
         ends += [middle - half, middle + half, own - misfit, own + misfit]
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))

@@ -152,15 +152,14 @@ def _axis(
     slow = [*largest(d for d in found.disturbances if d.concerns(axis) and d.file in files)]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
-    least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
+    least = assess.ROCKING if may_rock(tests.folder, axis) else 0.0
     answers: tuple[Answer, ...] = ()
     tested_own = assess.commands_that_push(push, tested) if push else tested
     if is_told and is_steady:
         commands = assess.commands_of_answers(tested_own)
         pushes = [push(c) for c in commands] if push else []
-        posteriors = (*fit.rivals, *fit.posteriors)
-        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, least, fit.speeds)
-        answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
+        every = assess.answers(fit.posteriors, axis, vehicle, tested, commands, pushes, least, fit.speeds)
+        answers = tuple(a for a in every if abs(a.command) <= round(fit.most_followed, 2))
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]

@@ -8,7 +8,7 @@ import numpy as np
 
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.assess import EXACT, beyond_tests
+from rov_fmu.identify.assess import beyond_tests
 from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
@@ -80,8 +80,8 @@ def next_test(
 
 
 def _widths(slopes: Array, covariance: Array) -> Array:
-    """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
-    return np.maximum(QUANTILE * np.sqrt(variances_of(slopes, covariance)), EXACT)
+    """Return the relative half-widths of some intervals."""
+    return QUANTILE * np.sqrt(variances_of(slopes, covariance))
 
 
 def _at_least(tested: Tested, strength: float) -> Tested:

@@ -94,10 +94,9 @@ CONSTANTS = {
 }
 """Chosen after results were seen. [priors] and the rules of the verdict have their own tables, with their reasons."""
 
-POSITIVE, KEPT, VERY_STRONG = 2.0, 6.0, 10.0
-"""The evidence, 2 ln of the Bayes factor or of the posterior odds, that is positive, strong and very strong (Kass and
-Raftery 1995). What is strong is told: an effect, a slow process, a cause, a slip, or a hypothesis about the structure.
-"""
+POSITIVE, KEPT = 2.0, 6.0
+"""The evidence, 2 ln of the Bayes factor or of the posterior odds, that is positive and strong (Kass and Raftery
+1995). What is strong is told: an effect, a slow process, a cause, a slip, or a hypothesis about the structure."""
 _NOTHING = 0.001
 """The share of the thrust or of the velocity below which a slow process without strong evidence is none."""
 

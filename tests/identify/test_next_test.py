@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
-from rov_fmu.identify.assess import EXACT
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective
@@ -90,7 +89,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
         return np.log(np.abs(shapes.motions(vehicle, HEAVE, np.array([command])).response()[0]))
 
     (slope,) = after.slopes(logarithm)
-    now = max(QUANTILE * float(np.sqrt(slope @ after.covariance @ slope)), EXACT)
+    now = QUANTILE * float(np.sqrt(slope @ after.covariance @ slope))
     assert 0.6 * test.then < now < 1.6 * test.then, "this log has an offset and a window of its own"
     assert now < 0.8 * test.now
 

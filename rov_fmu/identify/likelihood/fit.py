@@ -76,8 +76,6 @@ class Fit:
     """The hypotheses about the structure that won, with the coordinates of their rows."""
     odds: Mapping[Suspect, float] = field(default_factory=dict)
     """2 ln of the posterior odds of each against the best model without it."""
-    rivals: tuple[Posterior, ...] = ()
-    """Fits with others, which the data do not exclude."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the data do not tell apart."""
     has_ended: bool = False
@@ -202,7 +200,6 @@ def fit_all(
         (ends[0].z, ends[-1].z),
         {**dict.fromkeys(first), **search.now.starts},
         odds,
-        tuple(one.posterior for one in search.rivals),
         search.alike,
         search.has_ended,
         misfits,

@@ -48,12 +48,12 @@ from rov_fmu.identify.likelihood.solve import (
     start_of,
     total_information,
 )
-from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, WRONG, least_error, moves
+from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, WRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
-WINS, CLOSE = KEPT, VERY_STRONG
-"""The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
+WINS = KEPT
+"""The 2 ln of the odds from which a hypothesis wins."""
 SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
 _MOST, _ROUNDS = 3, 6
@@ -582,8 +582,6 @@ class StructureSearch:
         self.tried: dict[frozenset[Suspect], StructureFit | None] = {frozenset(): plain}
         self.lost = dict[Suspect | None, float]()
         """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
-        self.rivals = list[StructureFit]()
-        """The fits with hypotheses that did not win, and whose odds are near even."""
         self.refuted = dict[Suspect, Start]()
         """The hypotheses that were more probable than others, but do not explain the errors over 10 s."""
 
@@ -611,7 +609,6 @@ class StructureSearch:
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
             if self._gain(best) <= 0.0:
-                self.rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = self._with_needed(best)
 

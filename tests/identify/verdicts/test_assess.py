@@ -39,14 +39,15 @@ def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_te
     losing, exact = extended(VIDEORAY, d_rear=3.0), of_drag(0.0)
     table = replace(exact.table, layout=losing.layout, base=losing.coefficients)
     half, full = (
-        next(a for a in answers([replace(exact, table=table)], SURGE, losing, (0.5, 0.5)) if a.command == command)
-        for command in (0.5, 1.0)
+        next(a for a in answers([replace(exact, table=table)], SURGE, losing, (0.5, 0.5), least=0.03) if a.command == c)
+        for c in (0.5, 1.0)
     )
     V, _ = losing.response(SURGE, 0.5)
     assert VIDEORAY.response(SURGE, 0.5)[0] > V
     coasting = VIDEORAY.alone(SURGE, VIDEORAY.layout.usual_inputs)
     assert half.stop[0] == pytest.approx(coasting.stopping_distance(V, 0.1))
-    assert half.steady[1][1] / half.steady[0] == pytest.approx(np.exp(0.01))
+    assert half.steady[1][1] / half.steady[0] == pytest.approx(np.exp(0.03)), "it may have rocked unseen"
+    assert half.rise[1] == pytest.approx((half.rise[0], half.rise[0]))
     for value, (_, high) in (full.steady, full.rise, full.stop):
         assert np.log(high / value) == pytest.approx(t.ppf(0.975, 10) * 0.15 * np.log(2.0))
     assert answers_of_file(losing, SURGE)[2].stop[0] == pytest.approx(half.stop[0])
