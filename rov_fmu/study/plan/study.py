@@ -72,16 +72,16 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
     wrong += _check_rows(plan, path, has, from_file, lines)
     if wrong:
         raise PlanError(*wrong)
-    plan = plan.model_copy(update={"inputs": plan.inputs | from_file})
+    whole = plan.model_copy(update={"inputs": plan.inputs | from_file})
     middles = plan.times[:-1] + 0.5 * plan.step
-    inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in plan.inputs.items()}
+    inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in whole.inputs.items()}
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & has.keys()
     angles = ("phi", "theta") if {"phi", "theta", "psi"} <= has.keys() - {*design.names} else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
     told = [has[name] for name in (*design.names, *recorded)]
     about = {
         "runs": design.runs,
-        "plan": plan.mark | design.mark,
+        "plan": whole.mark | design.mark,
         "fmu": model.digest,
         "engine": "lanes" if model.vehicle else "fmu",
         "vehicle": plan.vehicle,

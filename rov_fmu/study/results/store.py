@@ -215,7 +215,7 @@ def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
         raise FileError(f"{path}: cannot be read: {told}. Remove it, and its runs are done again") from error
     if not is_own:
         new = _parts(study)
-        changed = ", ".join(sorted(key for key in {*old, *new} if old.get(key) != new.get(key)))
+        changed = brief(", ".join(sorted(key for key in {*old, *new} if old.get(key) != new.get(key))))
         raise FileError(f"{path.parents[1]}: holds runs of another study ({changed} changed): choose another folder")
     if not in_order or path.name != _name(span):
         raise FileError(f"{path}: has the runs {span[0]} to {span[1] - 1}, and not those of its name")
