@@ -71,6 +71,12 @@ def test_a_step_test_that_leaves_the_water_says_that_the_surface_is_off(fly: Cal
     assert "(at the surface)" in page.inner_text("#live-readings")
 
 
+def test_a_phone_shows_how_fast_the_maker_says_it_is(fly: Callable[..., Any]) -> None:
+    page = fly("bluerov2")
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.get_by_text("its maker states 1.5 m/s").is_visible()
+
+
 @pytest.mark.parametrize(("width", "scheme"), SCREENS)
 @pytest.mark.parametrize("kind", ["videoray", "bluerov2", "bluerov2_heavy"])
 def test_picture_and_charts_are_on_one_screen_and_nothing_overlaps_or_is_cut(
