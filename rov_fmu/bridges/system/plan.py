@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
 from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS
+from rov_fmu.fmus.description import TIME_LIMIT
 from rov_fmu.io.file_kinds import SYSTEM_PLAN, check_suffix
 from rov_fmu.io.messages import FileError, listed
 from rov_fmu.io.toml_file import AS_TUPLE, Beside, Finite, Name, Strict, Symbol, key_line, read_checked, rule
@@ -110,6 +111,8 @@ class SystemPlan(Strict):
     """The time between two exchanges, s."""
     stop_time: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     """s; a whole number of steps."""
+    time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = TIME_LIMIT
+    """The time in which the FMUs must begin, and take a step together, s; --run ends if they take longer."""
     connect: Annotated[tuple[_Connection, ...], AS_TUPLE, Field(max_length=_MOST_NAMED)] = ()
     """[["component.output", "component.input"], ...], or two ports (terminals), in any order. A third entry, of
     variables, is a number by which the value is multiplied."""

@@ -81,8 +81,11 @@ def run_system(
     steps: int,
     on_progress: Progress = silent,
     parts: int = 1,
+    time_limit: float = TIME_LIMIT,
 ) -> SystemRun:
     """Run a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
+
+    - `time_limit`: the time in which the FMUs must begin, and take a step together, s.
 
     Raises FileError about the path.
     """
@@ -96,7 +99,7 @@ def run_system(
             for name, own in folders_of(folder, structure.parts).items():
                 structure.parts[name].unpack(own)
             system = folder, [*structure.parts], structure.connections, read
-            child = ChildProcess(Master, *system, limits=budget(TIME_LIMIT))
+            child = ChildProcess(Master, *system, limits=budget(time_limit))
             stack.enter_context(closing(child))
             rows.append(np.array([child.call("begin", structure.values, step / parts, step * steps)]))
             done, count = 0, 1

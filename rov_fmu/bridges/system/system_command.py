@@ -53,7 +53,8 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
         outputs = [Output(output, ssp_content(files_of(plan, structure, output.stem)))]
         if runs:
             read = list(dict.fromkeys([*recorded_names(structure), *plan.plotted]))
-            rows, warnings = run_system(structure, path, read, plan.step, plan.steps, shown.begin("running"))
+            begun = shown.begin("running")
+            rows, warnings = run_system(structure, path, read, plan.step, plan.steps, begun, 1, plan.time_limit)
             for warning in warnings:
                 shown.print(f"warning: {warning}")
             if passed(structure):
@@ -76,7 +77,8 @@ def _half_step(
     """Return what half the step changes of the values `found`, also as a table. None, with a line, if it cannot run."""
     names = passed(structure)
     try:
-        halved = run_system(structure, path, names, plan.step, plan.steps, shown.begin("running with half the step"), 2)
+        begun = shown.begin("running with half the step")
+        halved = run_system(structure, path, names, plan.step, plan.steps, begun, 2, plan.time_limit)
     except FileError as error:
         shown.print(f"warning: with half the step: {error}")
         return None, None

@@ -14,7 +14,6 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 from scipy.optimize import brentq
 
-from rov_fmu.bridges.system import run
 from rov_fmu.bridges.system.companion import companion, slave_of, timed_rows
 from rov_fmu.bridges.system.companion import levels_of as levels_of_rows
 from rov_fmu.bridges.system.companions.current import Current
@@ -412,13 +411,12 @@ STRANGE = {
 
 @pytest.mark.parametrize("kind", STRANGE)
 def test_what_an_fmu_says_or_does_is_told_with_its_name_and_the_time(
-    kind: int, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    kind: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(run, "TIME_LIMIT", 2.0)
     FmuBuilder.build_FMU(HERE / "strange.py", dest=tmp_path)
     plan = tmp_path / "plan.toml"
     start, plain = f'fmu = "Strange.fmu"\nstart = {{ kind = {kind} }}\n', '[component.b]\nfmu = "Strange.fmu"\n'
-    plan.write_text(f"step = 0.5\nstop_time = 2\n{plain}[component.a]\n{start}", encoding="utf-8")
+    plan.write_text(f"step = 0.5\nstop_time = 2\ntime_limit = 2\n{plain}[component.a]\n{start}", encoding="utf-8")
     message, code = STRANGE[kind]
     assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == code
     assert capsys.readouterr().err.count(message) == 1
