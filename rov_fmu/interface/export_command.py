@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rov_fmu.bridges.allocation import allocation_files
-from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.bridges.mujoco import mujoco_files, mujoco_texts
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.fmu.card import card
@@ -116,7 +116,8 @@ def _contents(
             drawn = {} if draws is None else vehicle.draws(draws, np.random.default_rng(seed), forced=force)
             columns = {name: column.tolist() for name, column in drawn.items()}
             paragraphs = card(vehicle)
-            files = mujoco_files(vehicle, path.name, {heading: paragraphs[heading] for heading in _OF_CARD}, columns)
+            shown = {heading: paragraphs[heading] for heading in _OF_CARD}
+            files = mujoco_files(mujoco_texts(vehicle, path.name, shown, columns))
             there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
             return files, Exported({}, following=f"{there}python -m {path.name}")
         case "ardusub-gains":

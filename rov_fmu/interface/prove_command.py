@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
-from rov_fmu.fmus.description import TIME_LIMIT
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import PAGE
-from rov_fmu.io.messages import Progress, ProofError, listed, silent
+from rov_fmu.io.messages import ProofError, listed
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.check import check_evidence
-from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
+from rov_fmu.prove.claims import CLAIMS, Claim, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
 from rov_fmu.prove.proof import prove_fmu
 from rov_fmu.prove.runs import Plan
@@ -50,10 +49,10 @@ def print_proof_of(
     """
     how = interface, tolerance, time_limit
     if report:
+        check_targets([(report, PAGE)], [fmu, signature_path(fmu), *filter(None, [key])], force=force)
         with parts() as shown:
-            proof, written = prove_with_report(
-                fmu, report, *how, key=key, force=force, on_progress=shown.begin("checking the claims")
-            )
+            proof = prove_claims(fmu, *how, key, CLAIMS_OF_VEHICLES, shown.begin("checking the claims"))
+            written = write_whole(Output(report, sealed(proof_page(proof), "prove").encode()), force=force)
         print_claims(proof)
         print_evidence(proof.origin)
         print_end(written, "open it in a browser")
@@ -68,26 +67,6 @@ def print_proof_of(
     print_evidence(evidence)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
-
-
-def prove_with_report(
-    fmu: Path,
-    report: Path,
-    interface: str | None = None,
-    tolerance: float | None = None,
-    time_limit: float = TIME_LIMIT,
-    *,
-    key: Path | None = None,
-    force: bool = False,
-    on_progress: Progress = silent,
-) -> tuple[Proof, dict[Path, str]]:
-    """Check the claims about an FMU, and write the page about them. Return what it replaced, too.
-
-    Raises what `prove_claims` does.
-    """
-    check_targets([(report, PAGE)], [fmu, signature_path(fmu), *([key] if key else [])], force=force)
-    proof = prove_claims(fmu, interface, tolerance, time_limit, key, CLAIMS_OF_VEHICLES, on_progress)
-    return proof, write_whole(Output(report, sealed(proof_page(proof), "prove").encode()), force=force)
 
 
 def conservation(subject: Subject) -> Evidence:

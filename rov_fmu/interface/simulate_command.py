@@ -53,7 +53,13 @@ def simulate_vehicle(
     if vehicle.layout.has_only_water and "z" in result and (above := result["z"] < -AFLOAT).any():
         print_message(f"rov-fmu: {LEFT_WATER.format(f'{result.time[above.argmax()]:g}')}")
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    written = write_results(vehicle, result, output, picture, title(vehicle, settings, commands), force=force)
+    outputs = []
+    if output:
+        is_table = not is_mcap(output)
+        outputs.append(_table_output(result, output) if is_table else Output(output, vehicle.to_mcap(result)))
+    if picture:
+        outputs.append(_plot_output(result, picture, title(vehicle, settings, commands)))
+    written = write_whole(*outputs, force=force)
     if opens and picture:
         from rov_fmu.interface.fly_command import open_in_browser  # imported here because pages are slow
 
@@ -228,23 +234,6 @@ def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None)
     given = [f"commands of {shell_words(commands.name)}"] if commands else []
     given += map(one_line, settings)
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
-
-
-def write_results(
-    vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str, *, force: bool = False
-) -> dict[Path, str]:
-    """Write a result as a table or as MCAP, and as a plot, if there are paths. Return what each file replaced.
-
-    Raises InputError, WriteError.
-    """
-    outputs = []
-    if table and is_mcap(table):
-        outputs.append(Output(table, vehicle.to_mcap(result)))
-    elif table:
-        outputs.append(_table_output(result, table))
-    if plot:
-        outputs.append(_plot_output(result, plot, title))
-    return write_whole(*outputs, force=force)
 
 
 def _table_output(result: Result, path: Path) -> Output:

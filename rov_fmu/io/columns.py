@@ -171,18 +171,15 @@ def read_columns(
 
 
 def _rows(file: CsvFile, file_columns: Mapping[int, FileColumn], width: int) -> Iterator[Mapping[str, str]]:
-    """Yield the cells of each row that has not more of them than the header, by column."""
-    return (_by_column(cells, file_columns) for _, cells in islice(file, 1, None) if len(cells) <= width)
+    """Yield the cells of each row that has not more of them than the header, by column; one that it lacks is empty."""
+    for _, cells in islice(file, 1, None):
+        if len(cells) <= width:
+            yield {one.name: cells[index] if index < len(cells) else "" for index, one in file_columns.items()}
 
 
 def _content(cell: str) -> str:
     """Return the content of a cell for a message; empty for an empty cell."""
     return f" = {shown(cell)}" if cell else ""
-
-
-def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict[str, str]:
-    """Return the cells of a row that are read, by column. One that the row does not have is empty."""
-    return {column.name: cells[index] if index < len(cells) else "" for index, column in file_columns.items()}
 
 
 def _value(file_column: FileColumn, loose: bool, text: str, exists: bool) -> float:

@@ -73,7 +73,10 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     yield from _check_waves(layout)
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
         yield from check_distinct_names(layout)
-        yield from _check_named_coefficients(parts, layout, lost)
+        for title, alternative in parts.alternatives.items():
+            yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
+        if "estimates" not in lost:
+            yield from _check_estimates(parts.estimates, parts.quantities(layout))
 
 
 def check_distinct_names(layout: Layout) -> Iterator[str]:
@@ -110,14 +113,6 @@ def _check_waves(layout: Layout) -> Iterator[str]:
     if layout.waves and layout.current_passes:
         reason = 'must be false with current = "passes", which would lose what the water\'s acceleration does'
         yield key_line("waves", reason, True)
-
-
-def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:
-    """Check the tables whose keys are names of coefficients: [alternatives] and [estimates]."""
-    for title, alternative in parts.alternatives.items():
-        yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
-    if "estimates" not in lost:
-        yield from _check_estimates(parts.estimates, parts.quantities(layout))
 
 
 def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:

@@ -147,50 +147,28 @@ def check_mass(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[st
     if not entries and not any(coefficients.get(f"{axis}_G") for axis in "xyz"):
         return
     try:
-        mass = _mass_matrix(layout, coefficients)
+        parameters = compiled(equation_of(layout).parameters)(coefficients)
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
         yield key_line(
             "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
         )
         return
+    mass = {name.removeprefix("mass_"): x for name, x in parameters.items() if name.startswith("mass_")}
     names = {name[0]: layout.by_velocity[name[0]].axis.name for name in mass if name[0] == name[1]}
-    wrong = [*_check_entries(mass, names, entries, coefficients)]
-    yield from wrong[:1]
-    if names and not wrong and _least_eigenvalue(names, mass) < _LEAST:
+    for a, b in combinations(names, 2):  # an entry that alone makes it not positive definite
+        most = sqrt(mass[a + a] * mass[b + b])
+        if abs(mass.get(a + b, 0.0)) >= most:
+            scale, is_added = sqrt(coefficients[f"beta_{a}"] * coefficients[f"beta_{b}"]), (a, b) in entries
+            key = cross_name("m_a", a, b) if is_added else _centre(a, b)
+            allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
+            of = f"the entry of the mass matrix for {listed([names[a], names[b]])}, with that of the centre of mass"
+            place = f"{'cross' if is_added else 'body'}.{key}.value"
+            yield key_line(place, f"{of}, must be {allowed}", coefficients[key])
+            return
+    if names and _least_eigenvalue(names, mass) < _LEAST:
         reduce = join_names([cross_name("m_a", a, b) for a, b in entries])
         reason = f"the mass matrix of {listed(names.values())} must be positive definite"
         yield key_line("cross" if entries else "body", f"{reason}: reduce {reduce or 'x_G, y_G, z_G'}")
-
-
-def _check_entries(
-    mass: Mapping[str, float],
-    names: Mapping[str, str],
-    given: Collection[tuple[str, str]],
-    coefficients: Mapping[str, float],
-) -> Iterator[str]:
-    """Yield a line for each entry of the mass matrix that alone makes it not positive definite.
-
-    `names` are the axes by their velocities, and `given` are the pairs of velocities with an added mass.
-    """
-    for a, b in combinations(names, 2):
-        most = sqrt(mass[a + a] * mass[b + b])
-        if abs(mass.get(a + b, 0.0)) < most:
-            continue
-        scale = sqrt(coefficients[f"beta_{a}"] * coefficients[f"beta_{b}"])
-        key = cross_name("m_a", a, b) if (a, b) in given else _centre(a, b)
-        allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
-        of = f"the entry of the mass matrix for {listed([names[a], names[b]])}, with that of the centre of mass"
-        table = "cross" if (a, b) in given else "body"
-        yield key_line(f"{table}.{key}.value", f"{of}, must be {allowed}", coefficients[key])
-
-
-def _mass_matrix(layout: Layout, coefficients: Mapping[str, float]) -> dict[str, float]:
-    """Return the entries of the upper half of the mass matrix with the tuning, by their velocities: uu, uq.
-
-    Raises ZeroDivisionError for a singular matrix, and for a β of 0.
-    """
-    parameters = compiled(equation_of(layout).parameters)(coefficients)
-    return {name.removeprefix("mass_"): x for name, x in parameters.items() if name.startswith("mass_")}
 
 
 def doubts(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:

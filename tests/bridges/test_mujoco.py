@@ -66,7 +66,7 @@ def package_of(vehicle: Vehicle) -> ModuleType:
     """Return the package of a vehicle, written to a folder and imported from there as users do."""
     folder = Path(_UNTIL_THE_END.enter_context(temporary_folder(f"{vehicle.identifier}_")))
     package = folder.name
-    for name, file in mujoco_files(vehicle, package, {"Where it holds": ["Here."]}, {}, HOST).items():
+    for name, file in mujoco_files(mujoco_texts(vehicle, package, {"Where it holds": ["Here."]}, {}), HOST).items():
         (folder / name).write_bytes(file.encode() if isinstance(file, str) else file)
     sys.path.insert(0, str(folder.parent))
     try:
@@ -575,7 +575,7 @@ def test_every_kind_of_vehicle_moves_or_is_refused_in_one_line(name: str) -> Non
     vehicle = bare.with_(VEHICLES[name].layout, **VEHICLES[name].coefficients) if name != "bare" else bare
     if "m_rov" not in vehicle.coefficients:
         with pytest.raises(InputError, match=r"^bare: has no surge.*a body in MuJoCo must have$"):
-            mujoco_files(vehicle, "rov", {}, {})
+            mujoco_texts(vehicle, "rov", {}, {})
         return
     rov = package_of(vehicle).load()
     for command, value in vehicle.layout.example(vehicle.layout.axes[0].axis).items():

@@ -75,21 +75,12 @@ _PROPELLER = 0.05
 """The radius, and half the length, of what is drawn for a thruster, relative to the size of the vehicle."""
 
 
-def mujoco_files(
-    vehicle: Vehicle,
-    package: str,
-    card: Mapping[str, Sequence[str]],
-    draws: Mapping[str, Sequence[float]],
-    platforms: Sequence[str | None] | None = None,
-) -> dict[str, str | bytes]:
-    """Return the files of the folder by name. `package` is its own name.
+def mujoco_files(texts: Mapping[str, str], platforms: Sequence[str | None] | None = None) -> dict[str, str | bytes]:
+    """Return the files of the folder by name: its texts, and libraries that take the step.
 
-    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. The step has a
-    library for each of `platforms`, of which None is this machine. By default these are this machine and HOSTS, if the
-    compiler has them. Raises InputError about a vehicle without a mass or with β = 0, and BuildError if the C cannot be
-    compiled.
+    There is one for each of `platforms`, of which None is this machine. By default these are this machine and HOSTS, if
+    the compiler has them. Raises BuildError if the C cannot be compiled.
     """
-    texts = mujoco_texts(vehicle, package, card, draws)
     if platforms is None:
         platforms = [*dict.fromkeys([*(HOSTS if is_zig(compiler()) else ()), host_platform(fmi=3)])]
     libraries = compile_for([*filter(None, platforms)], _c_of(texts))
@@ -104,7 +95,11 @@ def mujoco_files(
 def mujoco_texts(
     vehicle: Vehicle, package: str, card: Mapping[str, Sequence[str]], draws: Mapping[str, Sequence[float]]
 ) -> dict[str, str]:
-    """Return the files of the folder without its libraries, as `mujoco_files` does."""
+    """Return the files of the folder without its libraries, by name. `package` is its own name.
+
+    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. Raises
+    InputError about a vehicle without a mass or with β = 0.
+    """
     sdf.check_body(vehicle, "MuJoCo")
     points = [_point(vehicle, point) for point in vehicle.layout.points]
     vehicle = _in_mujoco(vehicle)
@@ -155,7 +150,7 @@ def load_mujoco(vehicle: Vehicle, **coefficients: float) -> "Rov":
         rov.data.ctrl[:] = 0.2  # the commands, -1 to 1
         rov.step()
 
-    Raises InputError and BuildError as `mujoco_files` does.
+    Raises InputError and BuildError as `mujoco_texts` and `mujoco_files` do.
     """
     import mujoco
 

@@ -53,13 +53,10 @@ _PICTURES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(
-    vehicle: Vehicle, *, native: bool, fmi: int = 2, interface: str = "both", module: bytes | None = None
-) -> dict[str, bytes]:
-    """Return the page and the pictures by their path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
+def documentation(vehicle: Vehicle, **how: Any) -> dict[str, bytes]:
+    """Return the page, as `documentation_page` does, and the pictures by their path in the FMU. Raises FileError."""
     return {
-        "documentation/index.html": text.encode(),
+        "documentation/index.html": documentation_page(vehicle, **how).encode(),
         CARD: card_text(vehicle).encode(),
         **pictures(vehicle),
     }

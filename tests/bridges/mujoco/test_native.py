@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 import rov_fmu
-from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.bridges.mujoco import mujoco_files, mujoco_texts
 from rov_fmu.bridges.mujoco.source import water_sources
 from tests.bridges.test_mujoco import loaded, mujoco, scene
 from tests.commands import BARE
@@ -373,7 +373,7 @@ def test_a_machine_without_a_library_of_ours_exports_its_own(tmp_path: Path) -> 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("platform.machine", lambda: "riscv64")
         patched.setattr("rov_fmu.bridges.mujoco.is_zig", lambda _: False)
-        files = mujoco_files(bare, "rov", {}, {})
+        files = mujoco_files(mujoco_texts(bare, "rov", {}, {}))
         name = f"water_{sys.platform}_riscv64.so"
         assert [*filter(lambda file: file.startswith("water_"), files)] == [name]
         (tmp_path / name).write_bytes(bytes(files[name]))  # type: ignore[arg-type]
@@ -384,7 +384,7 @@ def test_a_machine_without_a_library_of_ours_exports_its_own(tmp_path: Path) -> 
 @pytest.mark.long
 def test_the_folder_has_the_c_and_its_libraries_for_all_systems() -> None:
     bare = rov_fmu.load(BARE)
-    files = mujoco_files(bare, "rov", {}, {})
+    files = mujoco_files(mujoco_texts(bare, "rov", {}, {}))
     begins = {
         "water_linux_x86_64.so": b"\x7fELF",
         "water_linux_aarch64.so": b"\x7fELF",
