@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from verification.identification.strangers import gates
 from verification.identification.strangers.drawn import draw
-from verification.identification.strangers.judge import Judged, JudgedAxis, Number
+from verification.identification.strangers.judge import Judged, JudgedAxis, Number, judged
 from verification.identification.strangers.kinds import AS_MODELLED, BY_NAME
 from verification.identification.strangers.water import ROW, Array, flown
 
@@ -89,3 +89,24 @@ def test_a_wrong_answer_counts_for_its_kind_and_its_quantity_and_not_among_what_
     assert rows["vehicles with a fault whose cause is told"] == "1 of 1 (100 %)"
     assert rows["answers of right models inside; median error in half-widths"] == "2 of 2 (100 %), 0.50"
     assert {row[0]: row[2:] for row in gates.by_kind([stage])}["crisis"] == ("2, off: 2 time", "1, off: 1 time", "")
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize(
+    ("seed", "surge", "yaw", "causes"),
+    [
+        (9230009, "good", "good", 2),
+        (9230010, "usable", "usable", 0),
+        (9230028, "do not use", "do not use", 0),
+    ],
+    ids=[
+        "a velocity jumps as it grows",
+        "R2 alone shows wrong times",
+        "no cause explains",
+    ],
+)
+def test_of_a_stranger_only_what_is_true_is_said(seed: int, surge: str, yaw: str, causes: int) -> None:
+    one = judged(seed, 2)
+    assert {axis.axis: axis.word for axis in one.axes} == {"surge": surge, "yaw": yaw}
+    assert [is_true for _, is_true in one.causes] == [True] * causes
+    assert not any(axis.is_off() for axis in one.axes if axis.word == "good")
