@@ -117,6 +117,12 @@ _FOREIGN: Files = {
 }
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow machine tells its progress, which is no part of what is compared here."""
+    monkeypatch.setattr("rov_fmu.report.progress._EVERY", 1000.0)
+
+
 @pytest.fixture(scope="module")
 def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An FMU of another exporter, Co-Simulation alone, with experiments that we did not write."""
@@ -265,6 +271,10 @@ BAD: dict[str, tuple[Files, str]] = {
         f"{MANIFEST}: names 1001 experiments; at most 1000 are run",
     ),
     "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}, line 3: the time goes back"),
+    "an unknown parameter": (
+        {"k.ssv": '<ParameterSet><Parameter name="q"><Real value="1"/></Parameter></ParameterSet>'},
+        f"{FOLDER}/k.ssv: the FMU has no variable 'q'",
+    ),
     "a file that is a folder, too": (
         {"modelDescription.xml/": ""},
         "member 'modelDescription.xml': is the path of another member",

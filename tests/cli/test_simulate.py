@@ -163,6 +163,7 @@ WRONG = {
     "percent": ("--set u_l=30%", "--set u_l=30%: '30%' must be a finite number: 30 % is 0.3\n"),
     "no value": ("--set u_l", "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "percent of no fraction": ("--set m_rov=5%", "--set m_rov=5%: '5%' must be a finite number\n"),
+    "percent in words": ("--set u_l=x%", "--set u_l=x%: 'x%' must be a finite number\n"),
     "a table and an option": ("--input commands.csv --set u_l=1", "--set u_l: commands.csv has this input, too\n"),
     "twice": ("--set u_l=1 --set u_l=2", "--set u_l=2: u_l is set twice"),
     "a column of no input": (

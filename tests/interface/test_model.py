@@ -259,6 +259,7 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: v.to_mcap(pd.DataFrame({"run": [0, 1], "t": [0, 0]})),
         "result: must have the kept outputs of one run of a study$",
     ),
+    "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
     "unknown input": (
         lambda v: v.simulate(TIMES, {"ul": 1}),
         r"inputs\['ul'\]: .* no such input, .*; did you mean u_l?",

@@ -87,6 +87,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ({"inside": '<Parameters source="a.exp"/>'}, "a.exp: must begin with <ParameterSet>, and not with <Experim"),
         ({"inside": '<References source="gone.csv"/>'}, "gone.csv: there is no such file in the FMU"),
         ({"inside": '<References source="/y.csv"/>'}, "a.exp: source = '/y.csv' does not lead to a file in the FMU"),
+        ({"inside": '<References source="//[y"/>'}, "a.exp: source = '//[y' does not lead to a file"),
         ({"inside": '<References source="../../../y"/>'}, "a.exp: source = '../../../y' does not lead to a file"),
         ({"inside": ""}, "fmi-ls-manifest.xml: names no experiment with expected results"),
         ({"y": b"time,y\n0,\xff\n"}, "y.csv: is not UTF-8 text, at byte 9"),
