@@ -98,7 +98,8 @@ def _drawn(row: Signal) -> str:
     """Draw the course of a signal between its least and its largest value, with blanks in gaps."""
     means = [value for value in row.course if isfinite(value)]
     low, size = min(means, default=0.0), max(means, default=0.0) - min(means, default=0.0)
-    heights = (0.0 if size == 0.0 else (value - low) / size for value in row.course)
+    size = 1.0 if size <= 1e-9 * abs(low) else size  # means of equal numbers differ by rounding
+    heights = ((value - low) / size for value in row.course)
     levels = _LEVELS if console().encoding.startswith("utf") else _ASCII_LEVELS
     return "".join(levels[min(int(8 * height), 7)] if isfinite(height) else " " for height in heights)
 

@@ -155,3 +155,10 @@ def test_thrusters_without_a_name_of_their_own_stay() -> None:
     own = '[[thruster]]\nname = [1]\ndirection = "?"\n'
     after = tomllib.loads(completed(own, lacking(own, TOLD, has_vehicle=False)))
     assert [one["name"] for one in after["thruster"]] == [[1], "A", "B"]
+
+
+def test_a_comment_that_a_draft_shortens_is_not_said_twice() -> None:
+    own = '[body]\nI_r = { value = "?", unit = "kg.m2" }   # a guess will do: 0.02 m2 times m_rov\n'
+    draft = '[body]\nI_r = { value = 0.1, unit = "kg.m2" }   # a guess will do\n'
+    text = completed(own, lacking(own, draft, has_vehicle=False))
+    assert text == own.replace('"?"', "0.1")

@@ -15,8 +15,10 @@ from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table
+from rov_fmu.report.console_log import _drawn
 from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import number, number_text, panel_title, pretty_unit, sentence
+from rov_fmu.tank.inspection.inspection import Signal
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -248,3 +250,9 @@ def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.Capture
         assert re.findall(r"^rov-fmu: compiling (\w+): done in 0\.0 s$", found, re.M) == (
             platforms if platforms[1:] else []
         )
+
+
+def test_equal_commands_are_drawn_level() -> None:
+    """Their means differ by rounding."""
+    row = Signal("u_1", "1", 0.0, 3.0, 30, 10.0, 0.24, 0.24, (), (0.24, 0.24000000000000002, nan, 0.24))
+    assert _drawn(row) in ("\u2581\u2581 \u2581", "__ _")

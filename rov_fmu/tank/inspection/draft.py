@@ -245,7 +245,7 @@ def _put(table: Any, key: str, value: Any) -> None:
     table[key] = value
     if there is not None and not value.trivia.comment.startswith(there.trivia.comment):
         added = value.trivia.comment.removeprefix("#").strip()
-        value.trivia.comment = there.trivia.comment + (f"; {added}" if added else "")
+        value.trivia.comment = there.trivia.comment + (f"; {added}" if added not in there.trivia.comment else "")
         value.trivia.comment_ws = there.trivia.comment_ws
 
 

@@ -83,7 +83,7 @@ def test_what_was_done_already_is_not_asked_for_again() -> None:
     doubtful = AxisResult(HEAVE, **USUAL, structure=2.0, soon=2.0, mixed=["a.csv", "b.csv"])
     alone = replace(doubtful, alone=["c.csv"])
     apart = replace(alone, mixed=())
-    frequent = [replace(DEPTH, time=np.arange(len(DEPTH.time)) / 20.0)]
+    frequent = (replace(DEPTH, time=np.arange(len(DEPTH.time)) / 20.0),)
     leave = "eave it out of a.csv and b.csv by [leave_out] in rov.toml"
     assert [verdict(one).remedy for one in (doubtful, alone, apart)] == [
         f"Log this axis alone, and l{leave}.",
