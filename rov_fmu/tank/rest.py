@@ -7,9 +7,9 @@ where the depth changes: the acceleration is a c|c| - b w|w| - d w + e, with the
 At the beginning or the end of a log, thrusters that are off contradict their commands, too. A surface stops only a push
 up, and a bottom only one down: other pushes without an answer count against a rest there, except in air.
 
-A right dive has no such contradiction. Of 213 logs that were tried, among them 64 simulated dives that begin at depth 0
-in a tank without a surface, none is touched. Horizontal rests cannot be told so: a current that turns with the
-heading stops a vehicle, too.
+A right dive has no such contradiction: of 46 logs with a depth that were tried, among them four flights of the real
+ArduSub, none is touched. Horizontal rests cannot be told so: a current that turns with the heading stops a vehicle,
+too.
 """
 
 from collections.abc import Iterator
