@@ -247,11 +247,15 @@ def _quadratics(posterior: Posterior, fit: Fit, z: Array) -> Iterator[Quadratic]
 
 
 def _changed(posterior: Posterior, vehicle: Vehicle) -> list[str]:
-    """Return the names of the coefficients of the vehicle that the parameters change."""
-    parameters = posterior.table.parameters
+    """Return the names of the coefficients of the vehicle that the parameters change.
+
+    A neutral that is off may leave no dead band ahead, where one astern needs it in the file.
+    """
+    parameters, known = posterior.table.parameters, posterior.table.known
+    own = {curve.coefficient("c_0") for curve in posterior.table.layout.curves if curve.name in known.own_curves}
     moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in posterior.of_vehicle]
     values = posterior.table.coefficients(changed(posterior.z, [(0, 0.0), *moves]))
-    return [name for name in vehicle.coefficients if name in values and np.ptp(values[name]) > 0.0]
+    return [name for name in vehicle.coefficients if name in values and (name in own or np.ptp(values[name]) > 0.0)]
 
 
 @dataclass(frozen=True, eq=False)

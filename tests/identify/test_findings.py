@@ -196,6 +196,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     ("coupling", structured(Structure("coupling", "", 0.999, 1.0)), "a motion along one turns or moves", quiet()),
     ("curve of its own", structured(Structure("curve of its own", "l", 0.97, 0.7)), "thruster l: it has a", quiet()),
+    ("neutral", structured(Structure("neutral", "l", 0.97, 0.04)), "its neutral is off by 4% of full", quiet()),
     ("momentary commands", structured(LOST), "about 30% of the yaw command is lost between its rows (10 per", quiet()),
     (
         "reversed commands",

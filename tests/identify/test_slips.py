@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import file_fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.search import StructureSearch
-from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
@@ -170,7 +171,12 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
 def test_a_second_search_fits_only_the_files_as_they_stand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a fit of scaled channels finds does not depend on the fit to the files as they stand."""
     (log, *_), counts, fits, made = recordings(HEAVE), list[int](), list[Array](), module.Fits()
-    monkeypatch.setattr(module, "minimise", lambda *some, **how: fits.append(some[1]) or minimise(*some, **how))
+
+    def counted(objective: Objective, start: Array, **how: Any) -> Minimum:
+        fits.append(start)
+        return minimise(objective, start, **how)
+
+    monkeypatch.setattr(module, "minimise", counted)
     tests = load_tests(folder_of(write_folder(tmp_path, [slipped(log, SLIPS["heave up"])]), KNOWN, FORCES))
     objective = Objective.of_known(*begin(tests))
     for _ in range(2):

@@ -16,7 +16,7 @@ from scipy.special import expit
 from rov_fmu.equation.catalogue import COUPLED_AXES, CURVE, REVERSE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OWN_BANDS, OWN_CURVE, OWN_KEYS, PRIORS, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, NEUTRAL, OWN_BANDS, OWN_CURVE, OWN_KEYS, PRIORS, TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
@@ -453,13 +453,22 @@ HYPOTHESES = {
         is_contrast=True,
     ),
     OWN_CURVE: Hypothesis(
-        0.004,
+        0.002,
         _sharing,
         _differing,
         (-0.4,),
         "thruster {of}: it has a curve of its own, with {value} of the thrust astern, relative to ahead, that others "
         "have{odds}. Check its propeller, its speed controller and the neutral of this",
         frees=("health", *OWN_BANDS),
+        is_contrast=True,
+    ),
+    NEUTRAL: Hypothesis(
+        0.002,
+        _sharing,
+        _differing,
+        (0.04, -0.04),
+        "thruster {of}: its neutral is off by {value} of full command{odds}. Set the neutral of its speed controller",
+        frees=("health",),
         is_contrast=True,
     ),
     "command limit": Hypothesis(

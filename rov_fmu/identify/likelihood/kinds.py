@@ -29,7 +29,7 @@ INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "loggin
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 TURN = "turned velocity sensor"
-OWN_CURVE, OWN_BANDS = "curve of its own", ("dead band of its own", "dead band of its own astern")
+OWN_CURVE, NEUTRAL, OWN_BANDS = "curve of its own", "neutral", ("dead band of its own", "dead band of its own astern")
 SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
 OWN_KEYS = ("a_t", "b_t", "c_0")
@@ -549,6 +549,14 @@ KINDS = {
         )
         for kind in OWN_BANDS
     },
+    NEUTRAL: _of_structure(
+        "command by which the neutral is off: the dead band is so much narrower ahead, and wider astern",
+        deviation=0.05,
+        low=-0.2,
+        high=0.2,
+        null=0.0,
+        of_thruster=True,
+    ),
     "command limit": _of_structure(
         "command beyond which the thrusters push no more",
         ". The vehicle file does not have it",

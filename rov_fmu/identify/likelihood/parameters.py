@@ -21,6 +21,7 @@ from rov_fmu.identify.likelihood.kinds import (
     KINDS,
     LAG,
     LEAST_LAG,
+    NEUTRAL,
     OFFSET,
     OWN_BANDS,
     OWN_CURVE,
@@ -189,12 +190,14 @@ class Table:
         for name, (source, thruster) in self._own_curves.items():
             curve, shared = (self.layout.curves_by_name[one] for one in (name, source))
             factors = {f"{key}{REVERSE}": np.exp(self.get(z, OWN_CURVE, thruster)) for key in ("a_t", "b_t", "d")}
+            off = self.get(z, NEUTRAL, thruster)
             bands = {
-                f"c_0{end}": self.get(z, kind, thruster) for end, kind in zip(("", REVERSE), OWN_BANDS, strict=True)
+                f"c_0{end}": self.get(z, kind, thruster) + sign * off
+                for end, kind, sign in zip(("", REVERSE), OWN_BANDS, (-1.0, 1.0), strict=True)
             }
             for key in curve.keys:
-                value = values.get(shared.coefficient(key), 0.0)
-                values[curve.coefficient(key)] = value * factors.get(key, 1.0) + bands.get(key, 0.0)
+                value = values.get(shared.coefficient(key), 0.0) * factors.get(key, 1.0)
+                values[curve.coefficient(key)] = np.maximum(value + bands[key], 0.0) if key in bands else value
         return values | {name: self.base[name] for name in self.exact}
 
     @property

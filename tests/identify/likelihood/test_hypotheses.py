@@ -30,7 +30,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     kinds_freed,
     twins,
 )
-from rov_fmu.identify.likelihood.kinds import KINDS, OWN_BANDS, OWN_CURVE, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, NEUTRAL, OWN_BANDS, OWN_CURVE, TURN
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
@@ -116,6 +116,7 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "astern": Fault(
             OWN_CURVE, second, 0.9, acting=lambda u: {**u, second: np.where(u[second] < 0.0, 0.8, 1.0) * u[second]}
         ),
+        "off": Fault(NEUTRAL, second, acting=lambda u: {**u, second: u[second] + 0.04}, value=0.04),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
         "drooping": Fault("voltage drop", acting=lambda u: drooping(u, 0.3), value=0.3),
@@ -236,6 +237,7 @@ def test_a_thruster_with_a_curve_of_its_own_differs_astern_and_in_its_dead_bands
         ("thrust scale", shared, 0.2),
         ("advance", shared, 0.05),
         (OWN_CURVE, "r", np.log(0.6)),
+        (NEUTRAL, "r", 0.005),
         *((kind, "r", 0.02 * (n + 1)) for n, kind in enumerate(OWN_BANDS)),
     ):
         index = table.index(kind, of)
@@ -247,8 +249,8 @@ def test_a_thruster_with_a_curve_of_its_own_differs_astern_and_in_its_dead_bands
         for key, factor, more in (
             *((key, 1.0, 0.0) for key in ("a_t", "b_t", "d", "T")),
             *((key, 0.6, 0.0) for key in ("a_t_reverse", "b_t_reverse")),
-            ("c_0", 1.0, 0.02),
-            ("c_0_reverse", 1.0, 0.04),
+            ("c_0", 1.0, 0.02 - 0.005),
+            ("c_0_reverse", 1.0, 0.04 + 0.005),
         ):
             expected = factor * np.asarray(c[left.coefficient(key)]) + more
             assert np.asarray(c[right.coefficient(key)]) == pytest.approx(expected, rel=1e-12)

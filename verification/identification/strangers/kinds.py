@@ -355,7 +355,7 @@ STRANGERS = (
     Kind("lost lock", "a DVL shows 0 for 3 s, three times in each dive", shown=_of_velocities(_unlocked)),
     Kind("frame of the earth", "a DVL shows velocities to the north for 3 s, three times", shown=_over_ground),
     Kind("lost blade", "port has 85 % of its thrust ahead, and 55 % astern", _lost_blade, causes=_OWN_CURVE),
-    Kind("neutral off", "port gets 4 % more than its command", followed=_neutral_off, causes=_OWN_CURVE),
+    Kind("neutral off", "port gets 4 % more than its command", followed=_neutral_off, causes=r"neutral .*port"),
     Kind("unequal lags", "port is 2.5 times as slow", _unequal_lags),
     Kind("payload", "inertia is 30 % larger after 20 s of the first dive", _payload),
     Kind("turned DVL", "the DVL is turned by 25 degrees", shown=_turned, counts=(4,)),
