@@ -468,7 +468,7 @@ HYPOTHESES = {
         _differing,
         (0.04, -0.04),
         "thruster {of}: its neutral is off by {value} of full command{odds}. Set the neutral of its speed controller",
-        frees=("health",),
+        frees=OWN_BANDS,
         is_contrast=True,
     ),
     "command limit": Hypothesis(
