@@ -30,6 +30,8 @@ def test_figures_are_as_exact_as_the_docs_say() -> None:
         for step in np.linspace(0.8 * longest, longest, 81):
             t = step * np.arange(round(12.0 / step) + 1)
             (Tau, settled), _ = Figures({"Tau": "Tau(y)", "settled": "settling_time(y)"}, t).of({"y": 1.0 - np.exp(-t)})
+            assert Tau is not None
+            assert settled is not None
             off.append(Tau - 1.0)
             late.append((settled - log(20.0)) / step)
         assert most / 3.0 < max(off) < 1.2 * most

@@ -2,7 +2,6 @@
 
 import io
 import re
-from dataclasses import dataclass
 from math import inf, nan
 from pathlib import Path
 from time import sleep
@@ -16,7 +15,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table
 from rov_fmu.report.console_log import _drawn
-from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
+from rov_fmu.report.progress import Display, Parts, StudyParts, StudyProgress, compiling, parts
 from rov_fmu.report.templates import number, number_text, panel_title, pretty_unit, sentence
 from rov_fmu.tank.inspection.inspection import Signal
 
@@ -130,15 +129,9 @@ def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_
 # ---- The progress of long work ---------------------------------------------------------------------------------------
 
 
-@dataclass
-class Runs:
-    """The progress of a study."""
-
-    done: int
-    total: int = 12_000
-    failed: int = 0
-    dashboard: str = "http://localhost"
-    has_workers: bool = True
+def of_study(done: int, *, failed: int = 0, has_workers: bool = True) -> StudyProgress:
+    """Return the progress of a study."""
+    return StudyProgress(done, 12_000, failed, "http://localhost", has_workers)
 
 
 def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
@@ -149,12 +142,12 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.Cap
     (first,) = display.tasks
     assert (first.description, first.completed, first.fields["count"]) == ("its step", 0.25, "25%")
     study = StudyParts(shown)
-    study.update(Runs(2_000))
+    study.update(of_study(2_000))
     assert [task.description for task in display.tasks] == ["first", "starting the study", "runs"]
     assert [task.completed for task in display.tasks] == [1.0, 1.0, 0.0]
-    study.update(Runs(7_000))
+    study.update(of_study(7_000))
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
-    study.update(Runs(12_000))
+    study.update(of_study(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
     assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"
 
@@ -167,15 +160,15 @@ def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.Monk
     shown = Parts(display)
     study = StudyParts(shown)
     for now[0], runs, words in (
-        (0.0, Runs(2_000), "runs"),
-        (4.0, Runs(2_000, has_workers=False), "no worker is there, 4 s without a result"),
-        (5.0, Runs(2_100), "20 runs/s"),
-        (11.0, Runs(3_300), "118 runs/s"),
-        (17.0, Runs(3_900), "150 runs/s"),
-        (19.0, Runs(3_900), "129 runs/s"),
-        (19.5, Runs(3_900, has_workers=False), "no worker is there, 2 s without a result"),
-        (627.0, Runs(3_900, failed=7), "610 s without a result, 7 failed"),
-        (637.0, Runs(4_500), "60 runs/s"),
+        (0.0, of_study(2_000), "runs"),
+        (4.0, of_study(2_000, has_workers=False), "no worker is there, 4 s without a result"),
+        (5.0, of_study(2_100), "20 runs/s"),
+        (11.0, of_study(3_300), "118 runs/s"),
+        (17.0, of_study(3_900), "150 runs/s"),
+        (19.0, of_study(3_900), "129 runs/s"),
+        (19.5, of_study(3_900, has_workers=False), "no worker is there, 2 s without a result"),
+        (627.0, of_study(3_900, failed=7), "610 s without a result, 7 failed"),
+        (637.0, of_study(4_500), "60 runs/s"),
     ):
         study.update(runs)
         assert display.tasks[1].description == words
@@ -193,9 +186,9 @@ def test_a_pipe_gets_a_line_again_and_again(
         study = StudyParts(shown)
         sleep(0.12)
         now[0] = 7.0
-        study.update(Runs(6_000))
+        study.update(of_study(6_000))
         now[0] = 9.0
-        study.update(Runs(7_200, failed=2))
+        study.update(of_study(7_200, failed=2))
         sleep(0.12)
     sleep(0.12)
     text = capsys.readouterr().err

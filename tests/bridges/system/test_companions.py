@@ -23,6 +23,7 @@ from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import FileError
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -366,7 +367,7 @@ def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsy
 def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     """All pass on their outputs, then all take a step: z of the second water is V_N of the first, a step before."""
     part = Part.open(Path("water"), companion("current"), is_ours=True)
-    values = {"speed": 1.0, "exponent": 1.0, "seabed": 1.0, "z": 0.5}
+    values: dict[str, Value] = {"speed": 1.0, "exponent": 1.0, "seabed": 1.0, "z": 0.5}
     connections = [Connection(("a", "V_N"), ("b", "z"), 0.5)]
     structure = SystemStructure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections)
     names = [("a", "V_N"), ("b", "V_N")]
