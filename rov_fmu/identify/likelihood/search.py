@@ -58,7 +58,7 @@ SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
 _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
-_FITTED = 2
+_FITTED = 3
 """The most hypotheses that change the thrust that are fitted in a round, for each point at which J compares them."""
 _FAR = CONSTANTS["far"].value
 """Where one has won, others are not fitted whose J is so much above its own."""
