@@ -62,7 +62,8 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "points.csv").write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
     (folder / "report.html").write_text("a report", encoding="utf-8")
     (folder / "plan.toml").write_text('vehicle = "videoray.toml"\nstop_time = 1.0\n', encoding="utf-8")
-    (folder / "of_fmu.toml").write_text('fmu = "rov.fmu"\nstop_time = 1.0\nstep = 0.1\n', encoding="utf-8")
+    plan = 'fmu = "rov.fmu"\nstop_time = 1.0\nstep = 0.1\nruns = 1\nfigures = { top = "max(u)" }\n'
+    (folder / "of_fmu.toml").write_text(plan, encoding="utf-8")
     (folder / "commands.csv").write_text("time,u_l\n0,0.3\n", encoding="utf-8")
     (folder / "log.csv").write_text("time [s],depth [m]\n0,1\n", encoding="utf-8")
     for name in ("key", "rov.fmu.sig"):

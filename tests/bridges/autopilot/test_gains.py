@@ -100,7 +100,7 @@ def test_only_what_thrusters_push_is_held() -> None:
     for arguments, aims, reason in (
         ((5.0,), {"depth": "deep"}, "depth = 'deep': must be a finite number"),
         ((5.0,), {"depth": 2.0, "heave": 0.1}, "depth and heave are aims of one axis, heave"),
-        ((-1.0,), {"depth": 2.0}, "seconds = -1.0: must be more than 0"),
+        ((-1.0,), {"depth": 2.0}, "seconds = -1.0: must be a time above 0"),
     ):
         with pytest.raises(InputError, match=reason):
             rov_fmu.load("bluerov2").hold(*arguments, **aims)

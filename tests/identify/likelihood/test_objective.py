@@ -231,7 +231,7 @@ def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, 
     trials = objective.trials(moved, [objective.whole] * 5, runs)
     for n in range(5):
         one_off, one_S = objective.row_values(moved[:, n])
-        assert off[:, n] == pytest.approx(one_off, rel=1e-12, abs=1e-15)
+        assert off[:, n] == pytest.approx(one_off, rel=1e-12, abs=1e-14)  # of measurements of metres
         assert S[:, n] == pytest.approx(one_S, rel=1e-12)
         alone = objective.value(moved[:, n], objective.runs(moved[:, n], runs))
         assert trials[n][0] == pytest.approx(alone, rel=1e-9)
