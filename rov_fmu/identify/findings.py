@@ -41,7 +41,7 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import listed
+from rov_fmu.io.messages import capitalized, listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank.arrays import rms, usual_range
 from rov_fmu.tank.columns import push_along
@@ -362,7 +362,7 @@ def how_to_measure(axis: Axis, name: str) -> str:
 def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
-        f"{test.axis.name}: {test.words}. {test.target[:1].upper()}{test.target[1:]}, now {_known_to(test.now)}, "
+        f"{test.axis.name}: {test.words}. {capitalized(test.target)}, now {_known_to(test.now)}, "
         f"becomes {_known_to(test.then)}."
         for test in tests
         if test.is_useful
@@ -392,7 +392,7 @@ def repairs(identification: Identification) -> list[str]:
     odd = grouped(_disagreements(identification))
     others = len(identification.folder.logs) - len(odd)
     rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
-    return [f"{unlogged[:1].upper()}{unlogged[1:]}. Then identify again."] * bool(unlogged) + [
+    return [f"{capitalized(unlogged)}. Then identify again."] * bool(unlogged) + [
         f"Repair {file} or take it out of the folder{rest}. {' '.join(reasons)} Then identify again."
         for file, reasons in odd.items()
     ]

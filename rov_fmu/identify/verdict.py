@@ -21,7 +21,7 @@ from rov_fmu.identify.result import (
     relative_error,
     score_of,
 )
-from rov_fmu.io.messages import MOST, first_of, listed
+from rov_fmu.io.messages import MOST, capitalized, first_of, listed
 from rov_fmu.io.numbers import percent, significant
 from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -78,7 +78,7 @@ def _largest(e: AxisResult) -> dict[str, str]:
     """Return what the largest unknown disturbance does, and its file."""
     largest = max(e.unknown, key=lambda d: d.share)
     what = acting(largest)
-    return {"what": what[:1].upper() + what[1:], "file": largest.file}
+    return {"what": capitalized(what), "file": largest.file}
 
 
 def _reach(e: AxisResult) -> dict[str, str]:
@@ -127,8 +127,10 @@ def _apart(e: AxisResult) -> str:
     """Return how to tell an axis from what drives the vehicle at the same time."""
     if not e.mixed:
         return ""
-    leave = f"eave it out of {listed(first_of(e.mixed, MOST))} by [leave_out] in rov.toml"
-    return f"L{leave}, because it is alone in {listed(e.alone)}." if e.alone else f"Log this axis alone, and l{leave}."
+    leave = f"leave it out of {listed(first_of(e.mixed, MOST))} by [leave_out] in rov.toml"
+    if e.alone:
+        return capitalized(f"{leave}, because it is alone in {listed(e.alone)}.")
+    return f"Log this axis alone, and {leave}."
 
 
 def _faster(e: AxisResult) -> str:
@@ -304,8 +306,8 @@ RULES = (
 def verdict(e: AxisResult) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt, the worst first, and the tested commands.
 
-    What to do is the first remedy that was not followed already. None may be left of a mere *usable*: the intervals
-    allow for its doubts.
+    What to do is the first remedy that was not followed already. A *usable* model may have none left, because its
+    intervals allow for the doubts.
     """
     values = sorted(((rule, rule.value(e)) for rule in RULES), key=lambda pair: -WORDS.index(pair[0].word(pair[1])))
     word = values[0][0].word(values[0][1])

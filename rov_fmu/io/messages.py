@@ -175,6 +175,11 @@ _WITHOUT_TEXT: dict[type[BaseException], str] = {
 }
 
 
+def capitalized(text: str) -> str:
+    """Return a text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
 def listed(words: Iterable[str], before_last: str = "and") -> str:
     """Return words as in a sentence: a, b and c."""
     *some, last = [*words] or [""]

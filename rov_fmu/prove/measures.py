@@ -11,7 +11,7 @@ import numpy as np
 from rov_fmu.fmus.instance import Array, RunError
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import brief, listed
+from rov_fmu.io.messages import brief, capitalized, listed
 from rov_fmu.prove.proof import compare, least_divisor
 from rov_fmu.prove.runs import Answer
 from rov_fmu.prove.subject import Subject
@@ -42,7 +42,7 @@ class Evidence:
 
 
 def does_not_apply(reason: str) -> Evidence:
-    return Evidence("does not apply", f"{reason[:1].upper()}{reason[1:]}.")
+    return Evidence("does not apply", f"{capitalized(reason)}.")
 
 
 def in_short(value: float) -> str:
@@ -127,7 +127,7 @@ def step_size(subject: Subject) -> Evidence:
     words += f"within {in_short(largest)} of the largest value; {allowed:.0e} is allowed.{refused}"
     return Evidence(
         holds_if(largest <= allowed),
-        words[:1].upper() + words[1:],
+        capitalized(words),
         in_short(largest),
         curve={"steps": [*off], "deviations": [*off.values()], "allowed": [allowed]},
     )
@@ -206,7 +206,7 @@ def limits(subject: Subject) -> Evidence:
         words += f" A refusal changes something: {listed(changed)}."
     if is_free:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
-    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]
+    rows = [(capitalized(what), f"{a.refused} of {a.tried}", a.words) for what, a in answers]
     return Evidence(
         "measured" if is_free and not changed else holds_if(not (accepted or changed)),
         words,

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from rov_fmu import __version__
 from rov_fmu.io import numbers
+from rov_fmu.io.messages import capitalized
 from rov_fmu.io.templates import render
 from rov_fmu.report import console
 from rov_fmu.report.palette import PALETTE
@@ -107,7 +108,7 @@ def sentence(text: str) -> str:
     text = readable(text)
     head, colon, _ = text.partition(":")
     start = head if colon else head.partition(" ")[0]
-    return text if re.search(r"\.[A-Za-z]", start) else text[:1].upper() + text[1:]
+    return text if re.search(r"\.[A-Za-z]", start) else capitalized(text)
 
 
 def readable(text: str) -> str:
@@ -124,7 +125,7 @@ def pretty_unit(unit: str) -> str:
 
 def panel_title(quantity: str, unit: str) -> str:
     """Return the title of a panel: the quantity in words, and its unit if there is one."""
-    return with_unit(f"{quantity[:1].upper()}{quantity[1:]}", unit)
+    return with_unit(capitalized(quantity), unit)
 
 
 def with_unit(name: str, unit: str) -> str:
