@@ -7,16 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.fmus.instance import (
-    WARNING,
-    Array,
-    CallError,
-    Instance,
-    RunError,
-    Unpacked,
-    check,
-    last_message,
-)
+from rov_fmu.fmus.instance import WARNING, Array, CallError, Instance, RunError, Unpacked, check, last_message
 from rov_fmu.io.messages import brief
 
 

@@ -89,7 +89,7 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
 
     An axis of a log is predicted by all other logs if these know enough of it, otherwise each half of the log by the
     other logs and the other half. Where that does not know enough either, nothing is held out. Neither is an axis that
-    the log does not drive: its motion says little of the model, and may be slower than the errors of a right one.
+    the log does not drive: its motion says little about the model, and may be smaller than the errors of a right one.
     """
     logs, rows = objective.whole.logs, objective.whole.rows
     known, found = Knowledge(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], DataPart]]()

@@ -113,7 +113,7 @@ class _Match:
 Scaling = frozenset[tuple[_Match, float]]
 """Channels with their scales."""
 Fits = dict[Hashable, tuple[Objective, Minimum]]
-"""Fits by their scalings and hypotheses, and whether they are quick."""
+"""Fits by the channels with their scales, the hypotheses, and whether only a quick fit was made."""
 
 
 def slips(

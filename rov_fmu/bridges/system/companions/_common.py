@@ -25,7 +25,7 @@ def shape_of(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def register(slave: Any, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
-    """Give a slave its variables, and say of what step (s) its authors think."""
+    """Give a slave its variables, its author, and a default experiment with a step, s."""
     slave.author, slave.variables = "rov-fmu", variables
     slave.default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=step)
     for name, (causality, start, _, text) in variables.items():
