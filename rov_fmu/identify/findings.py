@@ -240,7 +240,7 @@ def told(identification: Identification) -> Identification:
     scale = assumed_scale(identification)
     data = vehicle.measured_from + (f" ({scale})" if scale else "")
     vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
-    return replace(identification, findings=findings, vehicle=vehicle)
+    return replace(identification, axes=_with_cure(identification), findings=findings, vehicle=vehicle)
 
 
 # ---- Findings from the result ----------------------------------------------------------------------------------------
@@ -381,21 +381,40 @@ def _known_to(width: float) -> str:
 
 
 def repairs(identification: Identification) -> list[str]:
-    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test.
-
-    A motion that no log shows, and that turns the vehicle, spoils all axes that share thrusters with yaw.
-    """
-    unlogged = ""
-    if any(result.verdict.word == "do not use" for result in identification.axes):
-        for finding in _on_unlogged_motion(identification):
-            unlogged = _APART.format(**finding.words)
+    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test."""
+    cure = _cure(identification)
     odd = grouped(_disagreements(identification))
     others = len(identification.folder.logs) - len(odd)
     rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
-    return [f"{capitalized(unlogged)}. Then identify again."] * bool(unlogged) + [
+    return [f"{cure} Then identify again."] * bool(cure) + [
         f"Repair {file} or take it out of the folder{rest}. {' '.join(reasons)} Then identify again."
         for file, reasons in odd.items()
     ]
+
+
+def _cure(identification: Identification) -> str:
+    """Return how to tell yaw from a motion that no log shows and that turns the vehicle, as a sentence; empty if there
+    is none, or if no axis is spoilt by it."""
+    if all(result.verdict.word != "do not use" for result in identification.axes):
+        return ""
+    return "".join(f"{capitalized(_APART.format(**one.words))}." for one in _on_unlogged_motion(identification))
+
+
+def _with_cure(identification: Identification) -> tuple[AxisResult, ...]:
+    """Return the results of the axes, with one thing to do where an unlogged motion turns the vehicle.
+
+    It bends the thrust curves of yaw, and so each axis that shares them. Mistakes in its logs are another cause.
+    """
+    cure, layout = _cure(identification), identification.vehicle.layout
+    curves = {
+        one.axis: {thruster.curve for thruster in layout.thrusters_along(one.axis)} for one in identification.axes
+    }
+    return tuple(
+        replace(one, verdict=replace(one.verdict, remedy=cure))
+        if cure and one.verdict.word != "good" and curves[one.axis] & curves[YAW] and not (one.slips or one.misfits)
+        else one
+        for one in identification.axes
+    )
 
 
 def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:

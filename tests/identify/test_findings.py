@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.identify.findings import (
     SENTENCES,
     SEVERITY,
@@ -77,7 +77,8 @@ def disturbance(kind: str = "slow force", **changes: Any) -> Identification:
 
 def with_channels(*names: str) -> Identification:
     channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
-    vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False))
+    made = quiet().vehicle.provenance
+    vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False), provenance=made)
     dive = replace(log("dive.csv"), channels=channels)
     return quiet(folder=replace(quiet().folder, logs=[dive]), vehicle=vehicle)
 
@@ -122,16 +123,23 @@ def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
     moving, turning_alone = turning("heading"), turning("heading", along=YAW)
     (asked,) = said(moving, "unlogged motion")
     assert not repairs(moving)
-    bad = [replace(moving.axes[0], verdict=Verdict("do not use", ())), *moving.axes[1:]]
-    (first,) = repairs(replace(moving, axes=tuple(bad)))
-    assert first.startswith("Turn on the spot in a log of its own, and leave yaw out of dive.csv by [leave_out]")
+    bad = replace(moving.axes[0], verdict=Verdict("do not use", ()))
+    again = Verdict("usable", ("The thrust changes slowly.",), "Log it again.")
+    heave, ahead, sway = (replace(bad, axis=axis, verdict=again) for axis in (HEAVE, SURGE, SWAY))
+    sway, heave = replace(sway, slips=SLIPS[:1]), replace(heave, verdict=replace(again, word="good"))
+    all_axes = replace(moving, axes=(bad, ahead, sway, heave))
+    (first, *_) = repairs(all_axes)
+    cure = "Turn on the spot in a log of its own, and leave yaw out of dive.csv by [leave_out] in rov.toml."
+    assert first == f"{cure} Then identify again."
+    remedies = [one.verdict.remedy for one in told(all_axes).axes]
+    assert remedies == [cure, cure, "Log it again.", "Log it again."]  # a slip, and a good axis, have their own
     assert "turn on the spot in a log of its own, and leave yaw out of dive.csv" in asked
     assert said(turning_alone, "unlogged motion") == []
     spot = replace(turning_alone.folder.logs[0], file="spot.csv (from 41 s)")
     dives = [replace(one, file="heave.csv") for one in turning("heading", along=HEAVE).folder.logs]  # has no turn
     both = replace(moving, folder=replace(moving.folder, logs=[*moving.folder.logs, spot, *dives]))
-    (told,) = said(both, "unlogged motion")
-    assert told.endswith("Or leave yaw out of dive.csv by [leave_out] in rov.toml, because it is alone in spot.csv")
+    (others,) = said(both, "unlogged motion")
+    assert others.endswith("Or leave yaw out of dive.csv by [leave_out] in rov.toml, because it is alone in spot.csv")
 
 
 BETA = IdentifiedCoefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
