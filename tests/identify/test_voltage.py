@@ -1,7 +1,7 @@
 """The exponent of the thrust over the voltage: found where it acts, and absent where the voltage acts on nothing."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +12,57 @@ from rov_fmu.identify.findings import result_sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import ROV_FILE
-from tests.identify.scenarios.drawn import Battery, Drawn, Fault
+from verification.identification.strangers.drawn import draw
+from verification.identification.strangers.kinds import AS_MODELLED, Kind
+from verification.identification.strangers.water import ROW, Array, Body, Moment
 
-DIVE = Drawn(axes=("heave",), sensors=("heave",), seconds=40.0, has_voltage=True)
+FULL = 16.0
+FITTED = f"""
+[known]
+V_0_main = {{ value = {FULL}, unit = "V", source = "measured" }}
+[fit]
+voltage = true
+"""
 
 
-def identified(folder: Path, battery: Battery, seed: int = 0, dive: Drawn = DIVE) -> Identification:
-    replace(dive, fault=Fault(battery=battery)).write(seed, folder)
-    return identify(load_tests(folder))
+@dataclass(frozen=True)
+class Battery:
+    """A battery whose voltage is logged."""
+
+    exponent: float
+    """Thrust is proportional to this power of the voltage: 0 for thrusters whose speed is regulated."""
+    sag: float = 0.0
+    """The share of the voltage that is lost in 100 s."""
+    droop: float = 0.0
+    """The share that is lost at full command."""
+    noise: float = 0.03
+    """V."""
+
+    def voltage(self, clock: Array, command: Array) -> Array:
+        """Return the voltage at n times for commands of 4 x n, V."""
+        return np.asarray(FULL * (1.0 - 0.01 * self.sag * clock - self.droop * np.max(command**2, axis=0)))
+
+    def act(self, m: Moment, _: Body) -> None:
+        if m.where != "bench":
+            m.gain *= (self.voltage(m.clock, m.command) / FULL) ** self.exponent
+
+
+def add_column(log: Path, cells: list[str]) -> None:
+    rows = log.read_text(encoding="utf-8").splitlines()
+    log.write_text("\n".join(map(",".join, zip(rows, cells, strict=True))), encoding="utf-8")
+
+
+def write(folder: Path, battery: Battery, seed: int = 0, count: int = 1) -> Path:
+    """Write two dives of a vehicle with 1 or 2 axes, and their voltage as the last column."""
+    drawn, random = draw(seed, count, Kind("", "", battery.act)), np.random.default_rng(seed)
+    drawn.write(folder)
+    with (folder / ROV_FILE).open("a", encoding="utf-8") as file:
+        file.write(FITTED)
+    for n, begun in enumerate(drawn.begins):
+        clock = begun + ROW * np.arange(len(drawn.commands))
+        volts = battery.voltage(clock, drawn.commands[:, :, n].T) + battery.noise * random.standard_normal(len(clock))
+        add_column(folder / f"dive_{n}.csv", ["voltage [V]", *(f"{x:.4f}" for x in volts)])
+    return folder
 
 
 def without_column(folder: Path, to: Path) -> Identification:
@@ -28,16 +71,16 @@ def without_column(folder: Path, to: Path) -> Identification:
     for file in folder.iterdir():
         text = file.read_text(encoding="utf-8")
         if file.name == ROV_FILE:
-            text = re.sub(r"(?s)\n\[known\].*", "\n", text)
+            text = text.replace(FITTED, "")
         elif file.name.startswith("dive"):
             text = re.sub(r"(?m),[^,\n]*$", "", text)
         (to / file.name).write_text(text, encoding="utf-8")
     return identify(load_tests(to))
 
 
-def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) -> None:
+def check_idle(folder: Path, battery: Battery, seed: int, count: int) -> None:
     """The voltage is told to act on nothing. No answer moves by more than a quarter of its interval's half-width."""
-    found = identified(folder / "with", battery, seed, dive)
+    found = identify(load_tests(write(folder / "with", battery, seed, count)))
     other = without_column(folder / "with", folder / "without")
     assert found.vehicle.layout.voltage is None
     assert len(result_sentences(found.findings, "idle voltage")) == 1
@@ -54,21 +97,18 @@ def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) ->
 @pytest.mark.long
 def test_a_voltage_that_acts_on_nothing_changes_no_answer(tmp_path: Path) -> None:
     """It sags with time and under load, and the speed of the thrusters is regulated."""
-    check_idle(tmp_path, Battery(0.0, sag=0.1, droop=0.1), 0, replace(DIVE, seconds=25.0))
+    check_idle(tmp_path, Battery(0.0, sag=0.1, droop=0.1), 0, 1)
 
 
 @pytest.mark.parametrize("number", ["0", "65.535"])
 def test_a_voltage_that_nothing_measures_is_as_no_column(number: str, tmp_path: Path) -> None:
-    replace(DIVE, has_voltage=False).write(0, tmp_path)
-    dive = next(tmp_path.glob("dive*"))
-    rows = dive.read_text(encoding="utf-8").splitlines()
-    found = []
-    for cells in (["voltage [V]", *[number] * (len(rows) - 1)], []):
-        dive.write_text("\n".join(map(",".join, zip(rows, cells, strict=True)) if cells else rows), encoding="utf-8")
-        tests = load_tests(tmp_path)
-        assert not tests.folder.voltages
-        found.append(begin(tests))
-    (known, logs, _), (without, others, _) = found
+    draw(0, 1, AS_MODELLED).write(tmp_path)
+    without, others, _ = begin(load_tests(tmp_path))
+    for dive in tmp_path.glob("dive*"):
+        add_column(dive, ["voltage [V]", *[number] * (len(dive.read_text(encoding="utf-8").splitlines()) - 1)])
+    tests = load_tests(tmp_path)
+    assert not tests.folder.voltages
+    known, logs, _ = begin(tests)
     assert (known.coefficients, known.layout) == (without.coefficients, without.layout)
     for log, other in zip(logs, others, strict=True):
         assert np.array_equal(log.record.inputs, other.record.inputs)
@@ -76,11 +116,10 @@ def test_a_voltage_that_nothing_measures_is_as_no_column(number: str, tmp_path: 
 
 def test_a_log_without_voltage_beside_one_with_it_has_that_of_the_vehicle(tmp_path: Path) -> None:
     """Such as one along a tape. At 0 V its thrusters would push nothing."""
-    replace(DIVE, fault=Fault(battery=Battery(1.0, sag=0.1))).write(0, tmp_path)
-    first, second = sorted(tmp_path.glob("dive*"))
+    first, second = sorted(write(tmp_path, Battery(1.0, sag=0.2)).glob("dive*"))
     second.write_text(re.sub(r"(?m),[^,\n]*$", "", second.read_text(encoding="utf-8")), encoding="utf-8")
     rov = tmp_path / ROV_FILE
-    rov.write_text(re.sub(r"(?s)\n\[known\].*", "\n", rov.read_text(encoding="utf-8")), encoding="utf-8")
+    rov.write_text(rov.read_text(encoding="utf-8").replace(FITTED, ""), encoding="utf-8")
     known, logs, _ = begin(load_tests(tmp_path))
     volts = {one.file: one.record.inputs[:, [*one.layout.inputs].index("voltage")] for one in logs}
     assert np.ptp(volts[first.name]) > 1.0
@@ -96,7 +135,7 @@ def test_a_log_without_voltage_beside_one_with_it_has_that_of_the_vehicle(tmp_pa
     ids=["noisy", "constant", "time", "load"],
 )
 def test_no_idle_voltage_changes_an_answer(battery: Battery, seed: int, tmp_path: Path) -> None:
-    check_idle(tmp_path, battery, seed, Drawn(seconds=40.0, has_voltage=True))
+    check_idle(tmp_path, battery, seed, 2)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +143,7 @@ def test_no_idle_voltage_changes_an_answer(battery: Battery, seed: int, tmp_path
     [(0.5, 0), *(pytest.param(n, seed, marks=pytest.mark.weekly) for n in (0.5, 1.0, 1.5, 2.0) for seed in range(5))],
 )
 def test_an_exponent_is_found(exponent: float, seed: int, tmp_path: Path) -> None:
-    found = identified(tmp_path / "a", Battery(exponent, sag=0.12, droop=0.06), seed)
+    found = identify(load_tests(write(tmp_path, Battery(exponent, sag=0.12, droop=0.06), seed)))
     (effect,) = (one for one in found.effects if one.kind == "voltage")
     low, high = effect.interval
     assert effect.kept

@@ -14,7 +14,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification, Interval, Prediction
 from rov_fmu.io.messages import FileError
 from rov_fmu.vehicle.description import Word
-from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, answer_names
+from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_name
 
 _POSSIBLE = {
     "lag": (0.0, 2.0),
@@ -170,9 +170,7 @@ def _estimates(result: Identification, truths: Truths) -> Iterator[Estimate]:
     found: dict[tuple[str, str], tuple[float, Interval | None, float]] = {}
     for each in result.axes:
         found |= {(each.axis.name, k.name): (k.value, k.interval, k.narrowed) for k in each.known}
-        for a in each.answers:
-            names = [(each.axis.name, name) for name in answer_names(a.command)]
-            found |= {name: (*answer, 0.0) for name, answer in zip(names, (a.steady, a.rise, a.stop), strict=True)}
+        found |= {(each.axis.name, steady_name(a.command)): (*a.steady, 0.0) for a in each.answers}
     for known in result.curves.values():
         found |= {("", k.name): (k.value, k.interval, k.narrowed) for k in known}
     for key, truth in truths.items():

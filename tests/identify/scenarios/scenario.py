@@ -23,11 +23,6 @@ def steady_name(command: float) -> str:
     return f"V_ss {100.0 * command:g} %"
 
 
-def answer_names(command: float) -> tuple[str, str, str]:
-    """Return the names of V_ss, the time to 63 % of it, and the stopping distance at a command."""
-    return steady_name(command), f"time {100.0 * command:g} %", f"way {100.0 * command:g} %"
-
-
 @dataclass(frozen=True)
 class Expected:
     """What the identification is held to in a scenario."""

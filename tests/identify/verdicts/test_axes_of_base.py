@@ -1,7 +1,6 @@
 """Axes that no test shows: they do not decide about the others, and every surface says so."""
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from io import StringIO
 from itertools import combinations
 from pathlib import Path
@@ -26,8 +25,7 @@ from rov_fmu.vehicle.description import VERDICT
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
-from tests.folders import HEAD, folder_of, read, responses
-from tests.identify.scenarios.drawn import Drawn
+from tests.folders import HEAD, MASS, PLACE, THRUSTER, TURNS, folder_of, pulled, read, responses
 from tests.often import spread
 from tests.report.pages import text_of
 from tests.report.test_report import leave_plots_out
@@ -62,6 +60,16 @@ def drawn(base: str, *columns: str) -> tuple[Array, dict[str, Array]]:
     thrusters = load_vehicle(SHIPPED[base]).layout.thrusters
     commands = {f"u_{one.name} [1]": np.repeat(random.uniform(-0.5, 0.5, 10), 10) for one in thrusters}
     return time, commands | {name: np.sin((1.0 + 0.1 * n) * time) for n, name in enumerate(columns)}
+
+
+def without_base(folder: Path, axes: str, sensors: Iterable[Axis], coupling: str = "") -> Path:
+    """Write a dive of a vehicle without a base, whose pair of thrusters drives surge and yaw, and the third heave."""
+    rov = f"{HEAD}[body]\n{coupling}{MASS}{TURNS}[curves.t200]\n" + THRUSTER.format(name="t", x=0, y=0, z=1)
+    for name, y in (("l", -0.15), ("r", 0.15)):
+        rov += THRUSTER.format(name=name, x=1, y=0, z=0) + PLACE.format(0, y)
+    folder_of(folder, rov + axes, {"thrust_t200.csv": pulled(40.0, 2.0)})
+    write_dive(folder / "dive.csv", *drawn("videoray", *(SENSORS[axis] for axis in sensors)))
+    return folder
 
 
 @pytest.mark.parametrize("base", spread(BASES, ["bluerov2"]))
@@ -107,38 +115,30 @@ def test_what_a_vehicle_without_a_base_lacks_is_told(tmp_path: Path) -> None:
     lacking = AxisOfBase(HEAVE, "", "nothing in the logs shows it", ("5", "6"))
     told = "heave: not identified: nothing in the logs shows it, so the vehicle has no heave and no thrusters 5 and 6."
     assert lacking.verdict.of(HEAVE) == told
-    Drawn(("surge", "heave", "yaw"), ("heave", "yaw"), seconds=10.0).write(0, tmp_path)
-    description = tmp_path / "rov.toml"
-    text = re.sub(r"(?m)^\[axes\..*\n", "", description.read_text(encoding="utf-8"))
-    description.write_text(text, encoding="utf-8")
-    tests = load_tests(tmp_path)
+    tests = load_tests(without_base(tmp_path, "", [HEAVE, YAW]))
     assert ("axis left out", "surge") in {(one.kind, one.axis) for one in tests.folder.findings}
     sentences = [*undetermined(tests.folder.logs, tests.description, ())]
     assert any("surge cannot be identified, so the vehicle has no surge: " in one for one in sentences)
 
 
 @pytest.mark.parametrize(
-    ("sensors", "is_coupled", "unseen"),
+    ("sensors", "coupling", "unseen"),
     [
-        (("yaw", "heave"), False, [SURGE]),
-        (("yaw",), False, [SURGE]),
-        (("heave",), False, []),
-        (("yaw", "heave"), True, []),
+        ([HEAVE, YAW], "", [SURGE]),
+        ([YAW], "", [SURGE]),
+        ([HEAVE], "", []),
+        ([HEAVE, YAW], "coupling = true\n", []),
     ],
 )
 def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
-    sensors: tuple[str, ...], is_coupled: bool, unseen: list[Axis], tmp_path: Path
+    sensors: list[Axis], coupling: str, unseen: list[Axis], tmp_path: Path
 ) -> None:
     """Its speed takes thrust from the thrusters that turn the vehicle. The file does not have it."""
-    Drawn(("surge", "heave", "yaw"), sensors, seconds=10.0).write(0, tmp_path / "dives")
-    description = tmp_path / "dives" / "rov.toml"
-    coupling = "[body]\ncoupling = true\n" if is_coupled else "[body]\n"
-    description.write_text(description.read_text(encoding="utf-8").replace("[body]\n", coupling), encoding="utf-8")
-    tests = load_tests(tmp_path / "dives")
+    tests = load_tests(without_base(tmp_path, "[axes.surge]\n[axes.heave]\n[axes.yaw]\n", sensors, coupling))
     known, logs, _ = begin(tests)
-    assert {form.axis.name for form in tests.layout.axes} == {*sensors}
+    assert [form.axis for form in tests.layout.axes] == sensors
     assert known.unseen == unseen
-    assert all({form.axis.name for form in one.layout.axes} == {*sensors, *(a.name for a in unseen)} for one in logs)
+    assert all({form.axis for form in one.layout.axes} == {*sensors, *unseen} for one in logs)
 
 
 @pytest.mark.long

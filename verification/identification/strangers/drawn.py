@@ -28,6 +28,8 @@ from verification.identification.strangers.water import (
 )
 
 DIVES = 2
+_AXES = {1: (HEAVE,), 2: (SURGE, YAW), 4: (SURGE, SWAY, HEAVE, YAW)}
+"""The axes of a vehicle by their number."""
 _NOISE = {SURGE: 0.008, SWAY: 0.008, HEAVE: 0.006, YAW: np.radians(0.4)}
 """The standard deviation of each sensor: m/s, m/s, m, rad."""
 HEADERS = {
@@ -61,7 +63,7 @@ position = {{ value = [0.0, {place:.6g}, 0.0], unit = "m", source = "drawn" }}
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A folder of dives, by its seed and the number of axes of its vehicle, 2 or 4."""
+    """A folder of dives, by its seed and the number of axes of its vehicle: 2, 4, or 1 for heave alone."""
 
     seed: int
     count: int
@@ -75,7 +77,12 @@ class Drawn:
     @property
     def axes(self) -> tuple[int, ...]:
         """The axes that the vehicle is said to have."""
-        return (SURGE, YAW) if self.count == 2 else (SURGE, SWAY, HEAVE, YAW)
+        return _AXES[self.count]
+
+    @property
+    def thrusters(self) -> dict[int, str]:
+        """The thrusters along these axes."""
+        return {n: name for n, name in enumerate(THRUSTERS) if DRIVEN[self.axes, n].any()}
 
     @cached_property
     def water(self) -> Water:
@@ -113,7 +120,7 @@ class Drawn:
         """Write rov.toml, the table of thrust, and the logs."""
         random, b = np.random.default_rng([self.seed, self.count, 3]), self.body
         text = _HEAD.format(mass=b.mass, turning=b.turning, coupling="coupling = true\n" if self.count == 4 else "")
-        for n, name in enumerate(THRUSTERS[: self.count]):
+        for n, name in self.thrusters.items():
             x, y, z = (DRIVEN[axis, n] for axis in (SURGE, SWAY, HEAVE))
             text += _THRUSTER.format(name=name, x=x, y=y, z=z, place=(-b.arm, b.arm, 0.0, 0.0)[n])
         text += "\n" + "".join(f"[axes.{AXES[axis]}]\n" for axis in self.axes)
@@ -125,8 +132,8 @@ class Drawn:
             text, table = text.replace("[curves.main]\n", about), {}
         files = {"rov.toml": text, **table}
         for dive in range(DIVES):
-            heads = ["time [s]", *(f"{name} [%]" for name in THRUSTERS[: self.count])]
-            values = [ROW * np.arange(len(self.commands)), *(100.0 * self.commands[:, : self.count, dive].T)]
+            heads = ["time [s]", *(f"{name} [%]" for name in self.thrusters.values())]
+            values = [ROW * np.arange(len(self.commands)), *(100.0 * self.commands[:, [*self.thrusters], dive].T)]
             for axis in self.axes:
                 shown = self.columns[axis][:, dive] + _NOISE[axis] * random.standard_normal(len(self.commands))
                 heads.append(HEADERS[axis])
@@ -181,7 +188,7 @@ def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
         linear=linear * push / top,
         astern=astern,
         top=top,
-        load=load if count == 4 else 0.0,
+        load=load if HEAVE in _AXES[count] else 0.0,
         arm=arm,
         full=full,
         reverse=random.uniform(0.7, 1.0),
@@ -195,7 +202,7 @@ def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
 def _pilot(random: np.random.Generator, rows: int, count: int, kind: Kind) -> Array:
     """Return the logged commands of a dive, rows x 4: levels along each axis that are held for a while."""
     sticks = np.zeros((rows, 4))
-    for axis in (SURGE, YAW) if count == 2 else range(4):
+    for axis in _AXES[count]:
         at, most = 20, random.uniform(0.55, 0.75) if axis != YAW else random.uniform(0.35, 0.6)
         while at < rows:
             end = at + int(random.integers(8, 50))
