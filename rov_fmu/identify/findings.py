@@ -679,8 +679,8 @@ def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
         if {SURGE, SWAY} & shown:
             return
         commands = dive.commands.in_rows
-        ahead = [np.abs(push_along(layout, axis, commands)).max() for axis in (SURGE, SWAY) if layout.has(axis)]
-        if max(ahead, default=0.0) > _ASIDE:
+        ahead = [np.abs(push_along(layout, axis, commands)).max() for axis in (SURGE, SWAY)]
+        if max(ahead) > _ASIDE:
             others.add(dive.whole_file)
         elif np.abs(push_along(layout, YAW, commands)).max() > _ASIDE:
             alone.add(dive.whole_file)

@@ -123,6 +123,8 @@ def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
     moving, turning_alone = turning("heading"), turning("heading", along=YAW)
     (asked,) = said(moving, "unlogged motion")
     assert not repairs(moving)
+    few = replace(BLUEROV.layout, axes=tuple(form for form in BLUEROV.layout.axes if form.axis in (HEAVE, YAW)))
+    assert said(replace(moving, vehicle=replace(moving.vehicle, layout=few)), "unlogged motion")
     bad = replace(moving.axes[0], verdict=Verdict("do not use", ()))
     again = Verdict("usable", ("The thrust changes slowly.",), "Log it again.")
     heave, ahead, sway = (replace(bad, axis=axis, verdict=again) for axis in (HEAVE, SURGE, SWAY))

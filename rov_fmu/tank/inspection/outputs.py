@@ -18,6 +18,7 @@ from rov_fmu.equation.parts import SourcedVector, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.log import Channel, Log
+from rov_fmu.tank.rest import without_rests
 from rov_fmu.vehicle.full_thrust import usual_thrust
 from rov_fmu.vehicle.geometry import undriven_axes
 
@@ -32,7 +33,7 @@ _SPANS, _POINTS, _STEP, _GAP = (1.0, 2.0, 4.0), 41, 0.5, 1.0
 """The lengths of the windows that are tried, s: a long one suits a slow axis and a noisy sensor. The number of their
 points, the time between two of them, s, and the longest time without a sample in one, s."""
 _MOST_WINDOWS, _LEAST_WINDOWS = 3000, 24
-"""The most windows of a log, and the least that tell anything."""
+"""The most windows of a log, and the least of all logs that tell anything."""
 _ALIKE = 0.1
 """The least singular value, relative to the largest one, of combinations of commands that are told apart."""
 _CLEAR, _LEAST_PART = 3.0, 0.2
@@ -102,14 +103,41 @@ def moved(logs: Sequence[Log]) -> Moved:
     """Return what the outputs of logs of several axes move, where the logs show it."""
     outputs = [name for log in logs if log.commands and not log.follows_axis for name in log.commands.thrusters]
     effects: dict[str, dict[Axis, float]] = {name: {} for name in outputs}
-    shown = []
+    logs, shown = _without_rests(logs, [*effects]), []
     for axis in GUESSED:
-        fits = [fit for span in _SPANS for fit in _fits(logs, axis, [*effects], span)]
-        if fits:
+        if fit := _fit(logs, axis, [*effects]):
             shown.append(axis)
-            for name, by in max(fits, key=lambda fit: fit.clearness.max(initial=0.0)).clear(effects):
+            for name, by in fit.clear(effects):
                 effects[name][axis] = by
     return Moved(frozenset(shown), effects)
+
+
+def _without_rests(logs: Sequence[Log], outputs: Sequence[str]) -> Sequence[Log]:
+    """Return the logs without the times at which the vehicle rests against something.
+
+    Which output pushes along heave is not known: each one is tried, and that counts beside whose rests the effects on
+    the depth are clearest.
+    """
+    best, most = logs, _clearness(logs, outputs)
+    for name in outputs:
+        thruster = Moved(frozenset(), {name: {HEAVE: 1.0}}).thrusters[name]
+        layout = Layout((VehicleAxis(HEAVE),), (), (thruster,))
+        pieces = [piece for log in logs for piece in without_rests(log, layout)]
+        if pieces != [*logs]:
+            clearness = _clearness(pieces, outputs)
+            best, most = (pieces, clearness) if clearness > most else (best, most)
+    return best
+
+
+def _clearness(logs: Sequence[Log], outputs: Sequence[str]) -> float:
+    """Return how clear the clearest effect of an output along heave is."""
+    return fit.most if (fit := _fit(logs, HEAVE, outputs)) else 0.0
+
+
+def _fit(logs: Sequence[Log], axis: Axis, outputs: Sequence[str]) -> "_Fit | None":
+    """Return the clearest regression for an axis, or None where no log shows it."""
+    fits = (fit for span in _SPANS for fit in _fits(logs, axis, outputs, span))
+    return max(fits, key=lambda fit: fit.most, default=None)
 
 
 def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) -> Iterator["_Fit"]:
@@ -122,7 +150,7 @@ def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) 
             if channel.quantity.axis is axis and channel.quantity.is_velocity is is_rate and not channel.unused
             for sides in _windows(log, channel, outputs, span)
         ]
-        if rows:
+        if sum(len(left) for left, _ in rows) >= _LEAST_WINDOWS:
             left, right = (np.concatenate(side) for side in zip(*rows, strict=True))
             yield _Fit.of(left, right, len(outputs), len(left) * _STEP / span)
 
@@ -139,7 +167,7 @@ def _windows(log: Log, channel: Channel, outputs: Sequence[str], span: float) ->
     gaps = np.append(0, np.cumsum(np.diff(time) > _GAP))
     at = [np.searchsorted(time, begins, side="right") - 1, np.searchsorted(time, begins + span)]
     begins = begins[gaps[at[0]] == gaps[at[1]]]
-    if len(begins) < _LEAST_WINDOWS:
+    if not len(begins):
         return
     part = np.linspace(0.0, 1.0, _POINTS)
     window = np.polynomial.Polynomial([0.0, 1.0, -1.0]) ** 3
@@ -163,6 +191,11 @@ class _Fit:
 
     effects: Array
     clearness: Array
+
+    @property
+    def most(self) -> float:
+        """How clear the clearest effect is."""
+        return float(self.clearness.max(initial=0.0))
 
     @classmethod
     def of(cls, left: Array, right: Array, outputs: int, independent: float) -> "_Fit":

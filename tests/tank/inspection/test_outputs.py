@@ -76,3 +76,19 @@ def test_what_moves_nothing_is_not_guessed_and_equal_commands_share() -> None:
     assert found.by_output["a"][HEAVE] == pytest.approx(found.by_output["b"][HEAVE])
     assert found.shown == {HEAVE}
     assert moved([log(None, channel("depth", TIME, TIME))]).by_output == {}
+
+
+def test_vertical_thrusters_are_found_in_a_dive_that_rests() -> None:
+    """Pushes on deck for 20 s, and on the bottom for half a minute, drown what they do between."""
+    rng, time = np.random.default_rng(12), np.arange(0.0, 180.0, 0.1)
+    inputs = np.vstack([held(rng, 2), held(rng, 2)])
+    inputs[200:240], inputs[-250:, 0] = 0.0, 0.6
+    depths, rate = [-0.8], 0.0
+    for now, (down, _) in zip(time, inputs, strict=True):
+        rate = (now > 24.0) * (rate + 0.1 * (1.2 * down * abs(down) - 0.3 * rate - 2.0 * abs(rate) * rate))
+        depths.append(min(depths[-1] + 0.1 * rate + 0.1 * (20.0 < now < 24.0), 6.0))  # lowered by hand from 20 to 24 s
+        rate = min(rate, 0.0) if depths[-1] == 6.0 else rate
+    shown = channel("depth", time, np.array(depths[1:]) + rng.normal(0.0, 0.005, len(time)))
+    found = moved([log(commands(time, dict(zip("vl", inputs.T, strict=True))), shown)])
+    assert found.by_output["v"][HEAVE] == pytest.approx(1.2, rel=0.2)
+    assert found.by_output["l"] == {}
