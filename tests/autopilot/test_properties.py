@@ -2,18 +2,20 @@
 
 import ctypes
 from dataclasses import replace
+from itertools import product
 from math import radians
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rov_fmu.autopilot import flights, law
-from rov_fmu.autopilot.allocation import voltages
+from rov_fmu.autopilot.allocation import thrust_rows, voltages
 from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
 from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import THRUST_EFFECTS
@@ -92,16 +94,33 @@ def test_each_of_several_vehicles_flies_by_its_own_gains() -> None:
     assert np.abs(both.sensors[0] - both.sensors[1]).max() > 0.1
 
 
-def test_axes_that_ask_for_too_much_together_are_scaled_and_keep_their_direction() -> None:
+@pytest.mark.parametrize(
+    "pair", [(SURGE, SWAY), (HEAVE, ROLL), (HEAVE, PITCH)], ids=["level", "with roll", "with pitch"]
+)
+def test_axes_that_ask_for_too_much_together_are_scaled_and_keep_their_direction(pair: tuple[Axis, Axis]) -> None:
     made = autopilot_of(HEAVY)
-    aims = np.tile([1.0, 0.5, 0.0, 0.0, 0.0, 0.0], (2, 1))
+    aims = np.zeros((2, 6))
+    aims[:, [AXES.index(axis) for axis in pair]] = 1.0, 0.5
     flight = Flights(HEAVY, made.sharing, [{"z": 10.0}]).fly(made.loops, np.full((2, 6), STICK), aims, made.step)
     commands = dict(zip(HEAVY.layout.commands, flight.outputs[0, -1].tolist(), strict=True))
     forces = HEAVY.commanded(HEAVY.layout.usual_inputs | commands)
-    X, Y = (sum(t.effect(axis) * forces[t.name] for t in HEAVY.layout.thrusters) for axis in (SURGE, SWAY))
-    asked = flight.demands[0, -1]
+    X, Y = (sum(t.effect(axis) * forces[t.name] for t in HEAVY.layout.thrusters) for axis in pair)
+    asked = flight.demands[0, -1, [AXES.index(axis) for axis in pair]]
     assert pytest.approx(asked[1] / asked[0], rel=1e-3) == Y / X
     assert 0.0 < X < 0.99 * asked[0]
+
+
+@pytest.mark.parametrize("path", [SHIPPED["videoray"], SHIPPED["bluerov2"], THRUST_EFFECTS], ids=lambda path: path.stem)
+def test_the_force_between_two_rows_is_that_of_the_curve(path: Path) -> None:
+    """To 4e-4 of the force, or of 1/200 of the strongest one, beyond the dead band."""
+    rov = load_vehicle(path)
+    for curve, sign in product(rov.layout.curves, (1.0, -1.0)):
+        rows = sign * np.array(thrust_rows(rov, curve, rov.layout.voltage))
+        force, command = rows[rows[:, 0] > 0.0][:: int(sign)].T
+        commands = np.linspace(command[0], command[-1], 4001)
+        true = np.array([sign * rov.curve_force(curve, sign * c, rov.layout.voltage) for c in commands.tolist()])
+        off = np.abs(np.interp(commands, command, force) - true)
+        assert (off < 4e-4 * np.maximum(true, 0.005 * true.max())).all()
 
 
 # ---- What it promises ------------------------------------------------------------------------------------------------

@@ -123,8 +123,10 @@ def test_the_duration_is_the_time_of_all_flights_and_of_the_silences() -> None:
     wait, again, late = [(5.0, b""), (1.0, b"")], flight[:1] * 2 + flight[1:10], [(0.0, b"late")]
     server: Any = Server(flight[:10] + wait + again + late)
     hints: list[str] = []
-    SitlConnection(setup_of(), hints.append, server.clock).serve(server, 7.0)
+    connection = SitlConnection(setup_of(), hints.append, server.clock)
+    connection.serve(server, 7.0)
     assert (server.sent, server.packets) == (20, late)
+    assert 0.0 < connection.traffic.own_time < 0.5
     assert hints == ["waiting for packets of ArduSub to UDP port 40000: start it with --model JSON"]
 
 
@@ -566,13 +568,14 @@ def frame_pulses(frame: str, seconds: float) -> list[list[int]]:
 
 @pytest.mark.parametrize("name", ["vectored", "vectored_6dof", "bluerov1", "vectored_6dof_90deg"])
 def test_another_frame_with_as_many_motors_is_noticed_and_the_own_one_is_not(name: str) -> None:
-    """FRAME_CONFIG 0 for 1, or 3 for 2, drives the vehicle astern or sideways when the stick is ahead."""
+    """FRAME_CONFIG 0 for 1, or 3 for 2, drives it astern or sideways when the stick is ahead. It takes 3 s to tell."""
     own = "vectored" if len(FRAMES[name]) == 6 else "vectored_6dof"
     vehicle = HEAVY if own == "vectored_6dof" else load_vehicle(SHIPPED["bluerov2"])
     setup = replace(setup_of(vehicle, z=10.0), frame=own)
     outputs = Outputs(setup.servos, len(FRAMES[own]), own)
-    found = []
+    told = []
     for pulses in frame_pulses(name, 6.0):
         outputs.add(1.0 / FAST, (*pulses, *[0] * (16 - len(pulses))))
-        found = [words for words, *_ in outputs.doubts()]
-    assert found == ([] if name == own else ["no demands give these pulses together"])
+        told.append([words for words, *_ in outputs.doubts()])
+    assert told[-1] == ([] if name == own else ["no demands give these pulses together"])
+    assert not any(told[: 3 * FAST - 1])

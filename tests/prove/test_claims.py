@@ -4,8 +4,10 @@ import hashlib
 import re
 import zipfile
 from collections.abc import Callable, Mapping
+from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomlkit
 from lxml import html
@@ -18,6 +20,7 @@ from rov_fmu.interface.prove_command import CLAIMS_OF_VEHICLES, conservation
 from rov_fmu.prove import measures
 from rov_fmu.prove.claims import Proof, prove_claims
 from rov_fmu.prove.measures import Evidence
+from rov_fmu.prove.proof import _deviation
 from rov_fmu.prove.subject import Subject, opened
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -171,6 +174,13 @@ def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path) -> None:
     assert found.result == "fails"
     assert "18 of 19 results of 7" in found.sentence
     assert "Experiment surge_70_tuned: x deviates by" in found.sentence
+
+
+def test_a_result_is_compared_by_lines_between_its_times_and_deviates_where_it_has_none() -> None:
+    times = np.array([0.0, 1.0, 1.0, 2.0])
+    values = [0.0, 1.0, 5.0, 7.0]
+    assert _deviation(times, values, [0.0, 0.5, 1.0, 1.0, 1.5], [0.0, 0.5, 1.25, 5.0, 6.0]) == 0.25
+    assert _deviation(times, values, [2.5], [8.0]) == inf
 
 
 @pytest.mark.long

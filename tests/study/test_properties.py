@@ -17,6 +17,7 @@ VARIED = {
     "d": {"values": (1.0, 4.0, 9.0)},
     "e": {"range": {"from": -1.0, "to": 1.0, "count": 5}},
     "n": {"uniform": (1.0, 6.0)},
+    "w": {"uniform": (-1.5e308, 1.5e308)},  # wider than the largest number
 }
 
 
@@ -25,7 +26,7 @@ def _variable(name: str) -> Variable:
     return Variable(name, 0, "Integer" if name == "n" else "Real", "parameter", True, False, low, np.inf, "1", 0.0)
 
 
-def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcden") -> Design:
+def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcdenw") -> Design:
     keys = {"sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
     plan = Plan.model_validate({**keys, "vary": {name: VARIED[name] for name in names}})
     return Design(plan, {name: _variable(name) for name in names})
@@ -44,9 +45,10 @@ def test_a_run_has_its_parameters_in_whatever_part_and_order_it_comes(sampler: s
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_the_parameters_are_distributed_as_the_plan_says(sampler: str) -> None:
-    a, b, c, d, e, n = _design(sampler, 8000).rows(0, 8000).T
+    a, b, c, d, e, n, w = _design(sampler, 8000).rows(0, 8000).T
     cut = stats.truncnorm(-0.5, np.inf, 1.0, 2.0)  # the FMU's minimum is 0
-    for found, expected in ((a, stats.uniform(2.0, 1.0)), (b, cut), (c, stats.lognorm(0.5, scale=3.0))):
+    flat = (a, stats.uniform(2.0, 1.0)), (w / 1.5e308, stats.uniform(-1.0, 2.0))
+    for found, expected in (*flat, (b, cut), (c, stats.lognorm(0.5, scale=3.0))):
         assert stats.kstest(found, expected.cdf).statistic < 0.025  # independent numbers exceed this once in 10^4 times
     for found, values in ((d, [1.0, 4.0, 9.0]), (e, [-1.0, -0.5, 0.0, 0.5, 1.0]), (n, [1, 2, 3, 4, 5, 6])):
         there, counts = np.unique(found, return_counts=True)
