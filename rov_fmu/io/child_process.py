@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import monotonic
@@ -41,7 +42,7 @@ class Limits:
     """
 
     time: float | None = None
-    """The time of each call, s of the wall clock."""
+    """The time of each call, s of `ChildProcess.clock`."""
     memory: int | None = None
     """The address space of the process, in bytes. It includes about 0.3 GB for Python and NumPy, most of it unused."""
     disk: int | None = None
@@ -102,6 +103,7 @@ class ChildProcess:
         """
         self._limits = limits
         self._answers: SimpleQueue[Any] = SimpleQueue()
+        self._waited = 0.0
         self._open = ExitStack()
         folder = self._open.enter_context(temporary_folder("rov-fmu-child-", temporary))
         folders = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "SQLITE_TMPDIR"), folder)
@@ -134,6 +136,16 @@ class ChildProcess:
         self._send((method, arguments, limits := limits or self._limits))
         return self._answer(limits)
 
+    def clock(self) -> float:
+        """Return the time of the wall clock without that in which the process waited for a processor, s.
+
+        So a limit does not depend on what else the machine does. Only Linux tells it, of the thread of the calls.
+        """
+        with suppress(OSError, ValueError, IndexError):  # another system, or the process is gone
+            told = Path(f"/proc/{self._process.pid}/schedstat").read_text(encoding="ascii")
+            self._waited = 1e-9 * float(told.split()[1])
+        return monotonic() - self._waited
+
     def close(self) -> None:
         """End the process, with those that it has started, and remove its temporary files."""
         self._open.close()
@@ -157,12 +169,12 @@ class ChildProcess:
         self._answers.put(None)  # the process has ended
 
     def _answer(self, limits: Limits) -> Any:
-        end = None if limits.time is None else monotonic() + limits.time
+        began = self.clock()
         while True:
             with suppress(Empty):
                 answer = self._answers.get(timeout=_POLL)
                 break
-            if end is not None and monotonic() > end:
+            if limits.time is not None and self.clock() - began > limits.time:
                 self.close()
                 raise LimitError("time", limits)
         if answer is None:

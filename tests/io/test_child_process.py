@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -33,6 +34,11 @@ class Counter:
 
     def hang(self) -> None:
         time.sleep(60.0)
+
+    def spin(self, seconds: float) -> None:
+        began = time.process_time()
+        while time.process_time() - began < seconds:
+            pass
 
     def end(self, code: int) -> None:
         os._exit(code)
@@ -98,6 +104,24 @@ def test_a_call_beyond_its_time_limit_ends_the_process() -> None:
     assert 0.3 <= time.monotonic() - began < 5.0
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells how long a process waits for a processor")
+def test_a_busy_machine_makes_no_time_limit_shorter() -> None:
+    """Three others share a processor with a call, which takes four times as long by the wall clock."""
+    spins = [sys.executable, "-c", "while True: pass"]
+    others = [subprocess.Popen(spins, start_new_session=True) for _ in range(3)]
+    try:
+        with closing(ChildProcess(Counter, 0, limits=Limits(time=0.5))) as child:
+            for pid in (child.call("pid"), *(one.pid for one in others)):
+                os.sched_setaffinity(pid, {min(os.sched_getaffinity(0))})
+            began = time.monotonic()
+            child.call("spin", 0.2)
+            assert time.monotonic() - began > 0.5
+    finally:
+        for one in others:
+            one.kill()
+            one.wait()
 
 
 def _write(size: int, path: str) -> None:

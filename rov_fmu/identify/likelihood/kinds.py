@@ -582,7 +582,7 @@ KINDS = {
         mean=0.15,
         deviation=0.15,
         low=0.0,
-        high=0.8,
+        high=0.5,  # with half of the thrust, the voltage has fallen by a third, and speed controllers switch off
         null=0.0,
     ),
     TURN: _of_structure(

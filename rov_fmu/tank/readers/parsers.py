@@ -17,7 +17,6 @@ from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
-from time import monotonic
 from traceback import walk_tb
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -181,13 +180,13 @@ class _Parser:
             try:
                 if left.time is not None and left.time <= 0.0:
                     raise LimitError("time", limits)
-                self._child = self._child or ChildProcess(Functions, limits=limits)
-                begin = monotonic()
+                child = self._child = self._child or ChildProcess(Functions, limits=limits)
+                begin = child.clock()
                 try:
                     call = _call, Path.cwd(), function, path, arguments, options
-                    return self._child.call("call", *call, limits=left)
+                    return child.call("call", *call, limits=left)
                 finally:
-                    self.spent[key] = self.spent.get(key, 0.0) + monotonic() - begin
+                    self.spent[key] = self.spent.get(key, 0.0) + child.clock() - begin
             except ChildError as error:
                 self.close()
                 if isinstance(error, LimitError):
