@@ -78,8 +78,6 @@ _ODD = 3.0
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
 _SURE = 0.99
-_APART = "{spot}leave yaw out of {others} by [leave_out] in rov.toml{alone}"
-"""How to tell yaw from a motion that turns the vehicle."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
@@ -119,7 +117,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
-            "moment), and is the likely cause. {coupling}" + _APART
+            "moment), and is the likely cause. {coupling}{apart}"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -397,7 +395,7 @@ def _cure(identification: Identification) -> str:
     is none, or if no axis is spoilt by it."""
     if all(result.verdict.word != "do not use" for result in identification.axes):
         return ""
-    return "".join(f"{capitalized(_APART.format(**one.words))}." for one in _on_unlogged_motion(identification))
+    return "".join(f"{capitalized(one.words['apart'])}." for one in _on_unlogged_motion(identification))
 
 
 def _with_cure(identification: Identification) -> tuple[AxisResult, ...]:
@@ -690,10 +688,15 @@ def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
             "unlogged motion",
             YAW.name,
             coupling="Log the velocity, or " if layout.coupled else _COUPLE,
-            spot="" if alone else "turn on the spot in a log of its own, and ",
-            others=listed(sorted(others)),
-            alone=f", because it is alone in {listed(sorted(alone))}" if alone else "",
+            apart=told_apart(YAW.name, sorted(others), sorted(alone), "turn on the spot in a log of its own"),
         )
+
+
+def told_apart(axis: str, mixed: Sequence[str], alone: Sequence[str], how: str) -> str:
+    """Return how to tell an axis from what drives the vehicle at the same time in `mixed` logs, as a sentence without
+    its end. `how` is how to log it alone, where no log is `alone`."""
+    leave = f"leave {axis} out of {listed(mixed)} by [leave_out] in rov.toml"
+    return f"{leave}, because it is alone in {listed(alone)}" if alone else f"{how}, and {leave}"
 
 
 def assumed_scale(identification: Identification, unit: str = "N") -> str:

@@ -249,13 +249,14 @@ def _quadratics(posterior: Posterior, fit: Fit, z: Array) -> Iterator[Quadratic]
 def _changed(posterior: Posterior, vehicle: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change.
 
-    A neutral that is off may leave no dead band ahead, where one astern needs it in the file.
+    They move both ways from the means of their priors, because a bound may hide what a parameter does where the fit
+    ended: a neutral that is off may leave no dead band.
     """
-    parameters, known = posterior.table.parameters, posterior.table.known
-    own = {curve.coefficient("c_0") for curve in posterior.table.layout.curves if curve.name in known.own_curves}
-    moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in posterior.of_vehicle]
-    values = posterior.table.coefficients(changed(posterior.z, [(0, 0.0), *moves]))
-    return [name for name in vehicle.coefficients if name in values and (name in own or np.ptp(values[name]) > 0.0)]
+    table = posterior.table
+    sizes = [(n, 0.1 * table.parameters[n].deviation + 0.01) for n in posterior.of_vehicle]
+    moves = [(n, sign * size) for n, size in sizes for sign in (1.0, -1.0)]
+    values = table.coefficients(changed(table.each("mean"), moves))
+    return [name for name in vehicle.coefficients if name in values and np.ptp(values[name]) > 0.0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.findings import acting, tested_in_words
+from rov_fmu.identify.findings import acting, tested_in_words, told_apart
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -125,12 +125,8 @@ def _known(e: AxisResult, *of: str) -> dict[str, str]:
 
 def _apart(e: AxisResult) -> str:
     """Return how to tell an axis from what drives the vehicle at the same time."""
-    if not e.mixed:
-        return ""
-    leave = f"leave it out of {listed(first_of(e.mixed, MOST))} by [leave_out] in rov.toml"
-    if e.alone:
-        return capitalized(f"{leave}, because it is alone in {listed(e.alone)}.")
-    return f"Log this axis alone, and {leave}."
+    words = told_apart("it", first_of(e.mixed, MOST), e.alone, "log this axis alone")
+    return f"{capitalized(words)}." if e.mixed else ""
 
 
 def _faster(e: AxisResult) -> str:
