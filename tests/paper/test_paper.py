@@ -6,6 +6,7 @@ fractions (the paper prints per cent). u, w and r are the velocities in surge, h
 """
 
 from collections.abc import Callable, Iterator
+from itertools import product
 from math import e, log, sin, sqrt
 from pathlib import Path
 
@@ -99,23 +100,6 @@ def top(u: float) -> float:
     return 6.494 * abs(u) * u + 0.0513 * u
 
 
-@pytest.mark.parametrize("axis", AXES)
-def test_1_14_15_16_drag_is_quadratic_and_linear(axis: str, run: Run) -> None:
-    """Without thrust, inertia times acceleration is the drag."""
-    for v in SPEEDS:
-        (acceleration,) = run({**NON_LINEAR, axis: v}, 0.0, [f"der({axis})"])
-        assert -AXES[axis] * acceleration == pytest.approx(drag(axis, v), rel=1e-14)
-
-
-def test_2_8_9_10_thrust_is_quadratic_and_linear(run: Run) -> None:
-    for u in COMMANDS:
-        F_l, F_r, F_t = run({"u_l": u, "u_r": u, "u_t": u}, 0.0, ["F_l", "F_r", "F_t"])
-        assert (F_l, F_l + F_r, F_t) == pytest.approx((F_r, rear(u), top(u)), rel=1e-14)
-        # (8), the fit that the paper does not use
-        F_l, F_r = run({"a_t_rear": 100.3, "b_t_rear": -27.09, "u_l": u, "u_r": u}, 0.0, ["F_l", "F_r"])
-        assert F_l + F_r == pytest.approx(100.3 * abs(u) * u - 27.09 * u, rel=1e-13)
-
-
 def test_6_7_least_squares_of_the_thrust_give_its_coefficients(run: Run) -> None:
     """min over a_t, b_t of the sum of W_k (F_ss,k - F_hat_ss,k)²; W_k is 1 in (6). The forces are those of the FMU."""
     u = np.linspace(0.1, 1.0, 10)
@@ -126,28 +110,25 @@ def test_6_7_least_squares_of_the_thrust_give_its_coefficients(run: Run) -> None
             assert np.linalg.lstsq(A, np.sqrt(W) * F_ss)[0] == pytest.approx(fitted, rel=1e-12)
 
 
-def test_3_4_newtons_second_law_in_each_axis(run: Run) -> None:
+def test_1_to_5_9_10_14_to_16_thrust_and_drag_accelerate_each_axis(run: Run) -> None:
     """(3a) m u' = F_r + F_l - F_d^u, (3b) m w' = F_t - F_d^w, (4) I_r r' = F_l R sin γ + F_r R sin(-γ) - tau_d^r.
 
-    The coupling f, g and h is ignored, as in the paper.
+    With opposite commands (4) is (5). The coupling f, g and h is ignored, as in the paper.
     """
-    for u_l, u_r, u_t, v in zip(COMMANDS, reversed(COMMANDS), COMMANDS[1:], SPEEDS, strict=False):
+    for (u_l, u_r), u_t, v in product(product(COMMANDS, repeat=2), (-0.3, 0.5), SPEEDS):
         start = {**NON_LINEAR, "u_l": u_l, "u_r": u_r, "u_t": u_t, "u": v, "w": -v, "r": 2.0 * v}
-        u_dot, w_dot, r_dot, tau = run(start, 0.0, ["der(u)", "der(w)", "der(r)", "tau_rear"])
-        F_l, F_r = 0.5 * rear(u_l), 0.5 * rear(u_r)
-        assert m_rov * u_dot == pytest.approx(F_r + F_l - drag("u", v), rel=1e-13)
-        assert m_rov * w_dot == pytest.approx(top(u_t) - drag("w", -v), rel=1e-13)
-        tau_rear = F_l * R * sin(gamma) + F_r * R * sin(-gamma)
-        assert tau == pytest.approx(tau_rear, rel=1e-13)
-        assert I_r * r_dot == pytest.approx(tau_rear - drag("r", 2.0 * v), rel=1e-12)
+        F_l, F_r, F_t = 0.5 * rear(u_l), 0.5 * rear(u_r), top(u_t)
+        tau = F_l * R * sin(gamma) + F_r * R * sin(-gamma)
+        forces = [F_r + F_l - drag("u", v), F_t - drag("w", -v), tau - drag("r", 2.0 * v)]
+        found = run(start, 0.0, ["F_l", "F_r", "F_t", "tau_rear", "der(u)", "der(w)", "der(r)"])
+        accelerations = [force / inertia for force, inertia in zip(forces, AXES.values(), strict=True)]
+        assert found == pytest.approx([F_l, F_r, F_t, tau, *accelerations], rel=1e-12, abs=1e-12)
 
 
-def test_5_commands_of_opposite_sign_give_one_torque(run: Run) -> None:
-    """I_r r' = R sin γ (F_l + F_r) - (a_d r |r| + b_d r), where both forces count as positive."""
+def test_8_the_fit_that_the_paper_does_not_use_is_that_of_the_other_coefficients(run: Run) -> None:
     for u in COMMANDS:
-        r_dot, u_dot = run({**NON_LINEAR, "u_l": u, "u_r": -u, "r": 0.7}, 0.0, ["der(r)", "der(u)"])
-        assert I_r * r_dot == pytest.approx(R * sin(gamma) * rear(u) - drag("r", 0.7), rel=1e-12)
-        assert u_dot == 0.0
+        F_l, F_r = run({"a_t_rear": 100.3, "b_t_rear": -27.09, "u_l": u, "u_r": u}, 0.0, ["F_l", "F_r"])
+        assert F_l + F_r == pytest.approx(100.3 * abs(u) * u - 27.09 * u, rel=1e-13)
 
 
 def commanded(axis: str, u: float) -> Values:
@@ -158,14 +139,6 @@ def commanded(axis: str, u: float) -> Values:
 def thrust(axis: str, u: float) -> float:
     """The force or the torque of these commands."""
     return {"u": rear(u), "w": top(u), "r": R * sin(gamma) * rear(u)}[axis]
-
-
-@pytest.mark.parametrize("axis", AXES)
-def test_11_12_13_at_constant_velocity_thrust_equals_drag(axis: str, run: Run) -> None:
-    for u in COMMANDS:
-        velocity, acceleration = run({**NON_LINEAR, **commanded(axis, u)}, 500.0, [axis, f"der({axis})"])
-        assert drag(axis, velocity) == pytest.approx(thrust(axis, u), rel=1e-13)
-        assert abs(acceleration) < 1e-13
 
 
 # ---- Equations (17) and (18): motion ---------------------------------------------------------------------------------
@@ -204,7 +177,7 @@ def test_17_tau_is_read_from_a_step_response_as_from_a_recording(run: Run, video
 
 
 def closed_form(model: Values, axis: str, u: float) -> tuple[float, float]:
-    """V_ss and Tau of (18) from rest, solved by hand: a_d V² + b_d V = αF, and a Riccati equation in time."""
+    """V_ss and Tau of (18) from rest by hand: a_d V² + b_d V = αF, as in (11) to (13), and a Riccati equation."""
     alpha, beta = ((TABLE_9 | model)[f"{name}_{axis}"] for name in ("alpha", "beta"))
     a_d, b_d = TABLE_9[f"a_d_{axis}"], TABLE_9[f"b_d_{axis}"]
     root = sqrt(b_d**2 + 4.0 * a_d * alpha * thrust(axis, u))

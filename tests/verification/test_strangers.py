@@ -128,6 +128,16 @@ def test_a_right_model_is_good_and_nothing_is_answered_beyond_a_limit_of_the_com
 
 
 @pytest.mark.weekly
+@pytest.mark.parametrize(("kind", "seed"), [("of 2 kg", 1), ("of 100 kg", 1), ("waves", 2)])
+def test_vehicles_of_other_sizes_are_good_and_one_in_waves_is_not(kind: str, seed: int) -> None:
+    one = judged(seed, 4, kind)
+    assert len(one.axes) == 4
+    assert not one.causes
+    assert {axis.word == "good" for axis in one.axes} == {kind != "waves"}
+    assert not any(axis.is_off() for axis in one.axes)
+
+
+@pytest.mark.weekly
 def test_verdicts_are_as_right_as_the_gate_asks() -> None:
     """By the folders of 40 seeds: at most 3 and 8 % of *good* axes have a wrong answer, and right models are good."""
     stage = gates.stage("now", [judged(9240001 + n, 2) for n in range(40)])

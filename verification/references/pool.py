@@ -6,9 +6,9 @@ that roll and pitch are those of rigid_pool.py.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from math import copysign, cos, pi, sin, sqrt
+from math import cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,10 +79,6 @@ class Conditions:
     tilt: Tilt | None = None
     """The roll and pitch of a vehicle that has neither axis. Thrust and velocity tilt with the vehicle, its net weight
     F_0_w stays vertical. The products of its velocities with the rates of roll and pitch are left out."""
-    curves: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
-    """By curve: the steady thrust (N) of one thruster as a function of its command, where it is no polynomial."""
-    has_rotors: bool = False
-    """True if the speeds of the rotors lag behind, and thrust is proportional to their square. All have a lag."""
 
 
 NOTHING = Conditions()
@@ -157,10 +153,10 @@ def _holds(
 
 def _rates(k: Vehicle, command: Array, given: Conditions) -> Rates:
     """Return the function that gives the derivatives of the state under held commands."""
-    steady = {}
-    for t, c in zip(k.layout.thrusters, command.tolist(), strict=True):
-        curve = given.curves.get(t.curve)
-        steady[t.name] = curve(c) if curve else thrust_of(k, k.layout.curve_of[t.name], c, FLOATS)
+    steady = {
+        t.name: thrust_of(k, k.layout.curve_of[t.name], c, FLOATS)
+        for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)
+    }
     held = driven(k, steady, {}, FLOATS)
     n, lags = len(held.axes), [*held.lags.values()]
     weight = k.coefficients.get("F_0_w", 0.0) if given.tilt and "w" in held.axes else 0.0
@@ -171,8 +167,7 @@ def _rates(k: Vehicle, command: Array, given: Conditions) -> Rates:
         thrust = given.thrust(time) if given.thrust else 1.0
         phi, theta, theta_rate = given.tilt.at(time) if given.tilt else (0.0, 0.0, 0.0)
         R = _rotation(phi, theta, y[n + 3])
-        forces = [x * abs(x) if given.has_rotors else x for x in y[n + 4 :]]
-        found = held.accelerations(y[:n], forces, thrust=thrust)
+        found = held.accelerations(y[:n], y[n + 4 :], thrust=thrust)
         earth = [-stiffness * x for stiffness, x in zip(given.tether, y[n : n + 3], strict=True)]
         earth[2] += weight
         for at, column, inertia in pulled if any(earth) else ():
@@ -183,9 +178,7 @@ def _rates(k: Vehicle, command: Array, given: Conditions) -> Rates:
         found += [north + given.current[0], east + given.current[1], down]
         found.append((r + theta_rate * sin(phi)) / (cos(phi) * cos(theta)))
         for lag, x in zip(lags, y[n + 4 :], strict=True):
-            goal = thrust * lag.target
-            goal = copysign(sqrt(abs(goal)), goal) if given.has_rotors else goal
-            found.append((goal - x) / lag.T)
+            found.append((thrust * lag.target - x) / lag.T)
         return found
 
     return derivatives

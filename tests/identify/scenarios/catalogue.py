@@ -1,14 +1,13 @@
-"""The scenarios by name: tank tests and dives of the vehicles that ship, and dives of vehicles of owners."""
+"""The scenarios by name: tank tests and dives of the vehicles that ship."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import radians
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from tests.identify.scenarios.owners import AUV, DIVE, SMALL, Owner
-from tests.identify.scenarios.scenario import KNOWN_THRUST, VOLTAGE, Expected, Given, Scenario, sagging
+from tests.identify.scenarios.scenario import KNOWN_THRUST, VOLTAGE, Expected, Given, sagging
 from tests.identify.scenarios.tank import TRUTHS, Logs, Sensor, Tank
-from verification.references.pool import NOTHING, Conditions, Tilt
+from verification.references.pool import Conditions, Tilt
 
 VELOCITY, DISTANCE = Sensor(SURGE, "velocity", 0.02), Sensor(SURGE, "distance", 0.02)
 DEPTH, HEADING = Sensor(HEAVE, "depth", 0.005), Sensor(YAW, "heading", radians(0.5))
@@ -33,7 +32,6 @@ _UP = {f"{key}_w_reverse": 1.3 * TRUTHS["videoray"][f"{key}_w"] for key in ("a_d
 _DELAY, _FLOW = Conditions(delay=0.2), Conditions(current=(0.06, -0.03))
 _SAG, _SATURATION = Conditions(thrust=sagging), Conditions(saturation=0.4)
 _TILT, _TETHER = Conditions(tilt=Tilt(radians(10.0))), Conditions(tether=(0.5, 0.5, 0.0))
-_SLOW_SAG = Conditions(thrust=lambda time: sagging(time, DIVE))
 
 
 def _usual(logs: Logs = _STEPS, *effects: str, **more: object) -> Tank:
@@ -138,29 +136,4 @@ INCOMPLETE: dict[str, Tank] = {
 }
 """The scenarios whose model lacks something."""
 
-_OWNER = Owner(expected=Expected(("lag", "load of heave", "dead band", "reverse thrust"), like_owners=True))
-"""The base has a dead band, a reverse thrust and a load of other sizes, so a difference of each is there."""
-
-
-def _owner(expected: Expected, conditions: Conditions = NOTHING, **more: object) -> Owner:
-    """Return the owner's vehicle under some conditions, with its own effects besides those of the scenario."""
-    effects = (*_OWNER.expected.effects, *expected.effects)
-    changed = replace(expected, effects=effects, like_owners=True)
-    return replace(_OWNER, conditions=conditions, expected=changed, **more)  # type: ignore[arg-type]
-
-
-OWNERS: dict[str, Owner] = {
-    "owner": _OWNER,
-    "owner, sag": _owner(_lacking("time"), _SLOW_SAG),
-    "owner, sag with voltage": _owner(Expected(("voltage",)), _SLOW_SAG, columns=("voltage",)),
-    "owner, saturation": _owner(_lacking("command"), _SATURATION),
-    "owner, tilt": _owner(_lacking(), _TILT),
-    "owner, tilt with roll and pitch": _owner(Expected(), _TILT, columns=("roll", "pitch")),
-    "owner, waves": _owner(_lacking(), waves=0.1),
-    "owner, tether": _owner(_lacking("distance", unusable=("surge", "sway")), _TETHER),
-    "auv of 100 kg": replace(_OWNER, kind=AUV),
-    "rov of 2 kg": replace(_OWNER, kind=SMALL),
-}
-"""Vehicles as owners have them: another one with each seed, and the model knows its thrust only roughly."""
-
-SCENARIOS: Mapping[str, Scenario] = {**COMPLETE, **INCOMPLETE, **OWNERS}
+SCENARIOS: Mapping[str, Tank] = {**COMPLETE, **INCOMPLETE}

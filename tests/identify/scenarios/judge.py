@@ -19,8 +19,6 @@ from tests.identify.scenarios.scenario import Expected
 BY_CHANCE = 0.001
 """The probability that chance alone breaks any of the promises that are judged together."""
 LEVEL = 0.95
-_OWNERS_LEVELS = 0.90, 0.99
-"""The smallest and the largest share of intervals of owners' vehicles that may cover."""
 _BY_DATA = 0.5
 """An interval is that of the data, and must not cover more often than it says, if it is narrower than this share of
 that of the prior."""
@@ -29,17 +27,16 @@ _MANY = 200
 _BIAS, _BIAS_IN_ERRORS = 0.02, 0.2
 """The allowed bias, relative and in standard errors; the larger one counts."""
 _FALSE_RUNS, _FALSE_AXES = 0.02, 0.05
-"""The share of runs with a false effect, and with an alarm; for owners' vehicles, that of axes with a false effect."""
+"""The share of runs with a false effect, and with an alarm; of incomplete models, that of axes with a
+false effect."""
 _WRONG_CAUSES = 0.1
 """The share of runs in which a cause that is named is not the true one."""
 _UNUSABLE = 0.95
 """The least share of runs that advise against a model which must not be used."""
-_BANDS = {True: (0.90, 0.99), False: (0.85, 1.0)}
-"""The smallest and the largest mean coverage of bands of a complete and of an incomplete model."""
+_BANDS = {True: 0.90, False: 0.85}
+"""The smallest mean coverage of bands of a complete and of an incomplete model."""
 _LEAST_SPREAD = 0.03
 """The coverage of bands varies at least so much between seeds; a few equal ones do not show that it never does."""
-_BAND_WIDTH = 2.5
-"""The widest bands, relative to what the actual errors imply."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +81,9 @@ def promises(outcomes: Sequence[Outcome], expected: Expected) -> list[Promise]:
     found = [Promise(f"seed {n}: refused: {o.error}", 0.0) for n, o in enumerate(outcomes) if o.error]
     found += [Promise(f"an impossible {effect}", 0.0) for o in answered for effect in o.impossible]
     if expected.complete:
-        found += _of_numbers(outcomes, expected)
+        found += _of_numbers(outcomes)
         found += _of_bias(answered)
-        alarmed = sum(bool(o.unusable if expected.like_owners else o.alarms) for o in answered)
+        alarmed = sum(bool(o.alarms) for o in answered)
         found.append(at_most(f"{alarmed} of {len(answered)} runs raise an alarm", alarmed, len(answered), _FALSE_RUNS))
     found.append(_of_effects(answered, expected))
     found.append(_of_causes(answered, expected))
@@ -113,19 +110,18 @@ def by_number(outcomes: Sequence[Outcome]) -> dict[str, list[Estimate]]:
     return found
 
 
-def _of_numbers(outcomes: Sequence[Outcome], expected: Expected) -> Iterator[Promise]:
+def _of_numbers(outcomes: Sequence[Outcome]) -> Iterator[Promise]:
     """Yield the promises that 95 % intervals cover as often as they say.
 
     An interval at a bound, and one that the prior or the least error of a velocity makes wider, may cover more often.
     """
-    low, high = _OWNERS_LEVELS if expected.like_owners else (LEVEL, LEVEL)
     everything = {"all": [estimate for o in outcomes for estimate in o.estimates]}
     for name, estimates in (by_number(outcomes) if len(outcomes) >= _MANY else everything).items():
         covered = sum(e.covered for e in estimates)
-        yield at_least(f"{name}: only {covered} of {len(estimates)} intervals cover", covered, len(estimates), low)
-    exact = [e for e in everything["all"] if expected.like_owners or (_is_by_data(e) and e.truth != 0.0)]
+        yield at_least(f"{name}: only {covered} of {len(estimates)} intervals cover", covered, len(estimates), LEVEL)
+    exact = [e for e in everything["all"] if _is_by_data(e) and e.truth != 0.0]
     covered = sum(e.covered for e in exact)
-    yield at_most(f"as many as {covered} of {len(exact)} intervals cover", covered, len(exact), high)
+    yield at_most(f"as many as {covered} of {len(exact)} intervals cover", covered, len(exact), LEVEL)
 
 
 def _is_by_data(estimate: Estimate) -> bool:
@@ -152,7 +148,7 @@ def _of_effects(outcomes: Sequence[Outcome], expected: Expected) -> Promise:
     """Return the promise that effects which are not there are rare."""
     false = [o.false_effects(expected.effects) for o in outcomes]
     kinds = ", ".join(sorted({effect for some in false for effect in some}))
-    if expected.like_owners or not expected.complete:
+    if not expected.complete:
         count = sum(min(len(some), len(o.verdicts)) for o, some in zip(outcomes, false, strict=True))
         total = sum(len(o.verdicts) for o in outcomes)
         return at_most(f"{count} of {total} axes have a false effect: {kinds}", count, total, _FALSE_AXES)
@@ -170,22 +166,16 @@ def _of_causes(outcomes: Sequence[Outcome], expected: Expected) -> Promise:
 
 
 def _of_bands(outcomes: Sequence[Outcome], expected: Expected) -> Iterator[Promise]:
-    """Yield the promises that bands contain the held-out samples and are not too wide.
+    """Yield the promise that bands contain the held-out samples.
 
     Samples are correlated, so the coverages of the seeds are compared with their own scatter.
     """
-    low, high = _BANDS[expected.complete]
+    low = _BANDS[expected.complete]
     coverages = [float(np.mean([band.coverage for band in o.bands])) for o in outcomes if o.bands]
     n, mean = len(coverages), float(np.mean(coverages)) if coverages else 0.0
     spread = max(float(np.std(coverages, ddof=1)) if n > 1 else 0.0, _LEAST_SPREAD) / sqrt(max(n, 1))
     words = f"bands contain {mean:.1%} of the held-out samples"
     yield Promise(words, float(student.cdf((mean - low) / spread, max(n - 1, 1))) if n else 0.0)
-    if not expected.like_owners:
-        return
-    yield Promise(words, float(student.sf((mean - high) / spread, max(n - 1, 1))) if n else 0.0)
-    for name, ratio in band_widths(outcomes).items():
-        words = f"bands of {name} are {ratio:.2f} times as wide as the errors imply"
-        yield Promise(words, float(ratio <= _BAND_WIDTH))
 
 
 def band_widths(outcomes: Sequence[Outcome]) -> dict[str, float]:

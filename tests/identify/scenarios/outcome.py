@@ -1,6 +1,5 @@
 """Identify the vehicle of a scenario, and keep what is judged: all of it is read from the result object."""
 
-import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,8 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification, Interval, Prediction
 from rov_fmu.io.messages import FileError
 from rov_fmu.vehicle.description import Word
-from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_name
+from tests.identify.scenarios.scenario import Truths, steady_name
+from tests.identify.scenarios.tank import Tank
 
 _POSSIBLE = {
     "lag": (0.0, 2.0),
@@ -116,35 +116,19 @@ class Outcome:
         )
 
 
-def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
-    """Write the tests of a scenario to a new folder, identify the vehicle from them, and return what is judged.
-
-    Where a scenario holds logs out by hand, the numbers are those of the fit that never read them. The predictions of
-    these logs are those that a result makes by all other logs.
-    """
+def outcome(scenario: Tank, seed: int, folder: Path) -> Outcome:
+    """Write the tests of a scenario to a new folder, identify the vehicle from them, and return what is judged."""
     scenario.write(seed, folder)
     begin = time.process_time()
     try:
         result = identify(load_tests(folder))
-        seconds = time.process_time() - begin
-        predictions = [p for axis in (_with_unseen(folder) or result).axes for p in axis.predictions]
     except FileError as error:
         return Outcome(error=str(error), seconds=time.process_time() - begin)
     except Exception as error:  # a crash is judged like a refusal, so that the other seeds are still run
         return Outcome(error=f"{type(error).__name__}: {error}", seconds=time.process_time() - begin)
-    held_out = {path.name for path in (folder / UNSEEN).glob("*")}
-    kept = [p for p in predictions if p.file in held_out or not held_out]
-    return read_result(result, scenario.truths(seed), [p for p in kept if p.is_judged], seconds)
-
-
-def _with_unseen(folder: Path) -> Identification | None:
-    """Identify the vehicle once more, from all logs, if some are held out by hand."""
-    if not (folder / UNSEEN).is_dir():
-        return None
-    whole = folder.with_name(f"{folder.name}_whole")
-    shutil.copytree(folder, whole, ignore=shutil.ignore_patterns(UNSEEN))
-    shutil.copytree(folder / UNSEEN, whole, dirs_exist_ok=True)
-    return identify(load_tests(whole))
+    seconds = time.process_time() - begin
+    predictions = [p for axis in result.axes for p in axis.predictions if p.is_judged]
+    return read_result(result, scenario.truths(), predictions, seconds)
 
 
 def read_result(result: Identification, truths: Truths, predictions: Sequence[Prediction], seconds: float) -> Outcome:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -35,28 +34,11 @@ class Expected:
     """True if the model can explain the data: intervals cover, nothing is biased, no alarm is raised."""
     unusable: tuple[str, ...] = ()
     """The axes of which at least one must be called `do not use`."""
-    like_owners: bool = False
-    """True for vehicles and conditions as owners have them: thrust is not exact, coverages and bands are judged by
-    wider limits from both sides, and false effects by axis."""
     seconds: float = inf
     """The most processor time of an identification, s."""
 
 
 NOTHING_SPECIAL = Expected()
-
-
-class Scenario(Protocol):
-    """Logs of a vehicle by a seed, of which the identification knows what rov.toml tells."""
-
-    @property
-    def expected(self) -> Expected:
-        """What the identification is held to."""
-
-    def write(self, seed: int, folder: Path) -> None:
-        """Write rov.toml and the tests to a folder; what no fit may see, to its folder UNSEEN."""
-
-    def truths(self, seed: int) -> Truths:
-        """Return the true numbers that are judged."""
 
 
 # ---- A battery -------------------------------------------------------------------------------------------------------
@@ -67,21 +49,17 @@ _EXPONENT = 1.5
 """Thrust is proportional to this power of the voltage."""
 
 
-def voltage(time: float, seconds: float = 60.0) -> float:
-    """Return the voltage (V) of a battery that loses 10 % in so many seconds."""
-    return VOLTAGE * (1.0 - 0.1 * time / seconds)
+def voltage(time: float) -> float:
+    """Return the voltage (V) of a battery that loses 10 % in 60 s."""
+    return VOLTAGE * (1.0 - 0.1 * time / 60.0)
 
 
-def sagging(time: float, seconds: float = 60.0) -> float:
+def sagging(time: float) -> float:
     """Return the factor of the thrust under that voltage."""
-    return float((voltage(time, seconds) / VOLTAGE) ** _EXPONENT)
+    return float((voltage(time) / VOLTAGE) ** _EXPONENT)
 
 
 # ---- Folders ---------------------------------------------------------------------------------------------------------
-
-UNSEEN = "unseen"
-"""The folder within a folder of tests with the logs that are held out by hand."""
-
 
 Table = Mapping[str, Array]
 """The columns of a table by their headers."""
@@ -105,17 +83,16 @@ def write_folder(
     folder: Path,
     tables: Mapping[str, Table],
     *,
-    base: str = "",
-    hardware: str = "",
+    base: str,
     known: Mapping[str, Given],
     fit: Sequence[str] = (),
     priors: Mapping[str, float] = {},
 ) -> None:
     """Write a folder of tests: its tables by file, and all that rov.toml tells.
 
-    The hardware is that of a base, or is given by tables of rov.toml. `fit` names the keys of [fit] that are true.
+    The hardware is that of a base. `fit` names the keys of [fit] that are true.
     """
-    text = (f'base = "{base}"\n' if base else "") + HEAD + hardware
+    text = f'base = "{base}"\n{HEAD}'
     lines = {
         "known": [
             f'{name} = {{ value = {given.value!r}, unit = "{given.unit}", source = "measured" }}'
@@ -125,10 +102,10 @@ def write_folder(
         "priors": [f"{key} = {deviation}" for key, deviation in priors.items()],
     }
     text += "".join("\n".join([f"\n[{table}]", *entries, ""]) for table, entries in lines.items() if entries)
-    folder_of(folder, text, {name: csv_text(table) for name, table in tables.items()})
+    folder_of(folder, text, {name: _csv(table) for name, table in tables.items()})
 
 
-def csv_text(table: Table) -> str:
+def _csv(table: Table) -> str:
     """Return the text of a CSV file. A cell is empty where there is no number."""
     rows = zip(*table.values(), strict=True)
     return "\n".join([",".join(table), *(",".join("" if np.isnan(x) else f"{x:.8g}" for x in row) for row in rows), ""])

@@ -122,7 +122,7 @@ class Tank:
         tables = {flight.file: _table(self, truth, flight, random) for flight in flights(self, random)}
         write_folder(folder, tables, base=self.vehicle, known=self.known, fit=self.fit, priors=self.priors)
 
-    def truths(self, seed: int = 0) -> Truths:  # noqa: ARG002
+    def truths(self) -> Truths:
         """Return drag, β and V_ss of each axis, and the lags that are asked for. Roll and pitch have no V_ss.
 
         With a logged voltage, V_ss is that at the voltage of the measured thrust.

@@ -6,25 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from tests.identify.scenarios.catalogue import OWNERS, SCENARIOS
+from tests.identify.scenarios.catalogue import SCENARIOS
 from tests.identify.scenarios.judge import broken, promises
 from tests.identify.scenarios.outcome import outcome
 
 OFTEN = {"gaps while turning": 1}
 """The scenarios of the long tests, and the number of their seeds. All are run with more seeds once a week."""
-WEEKLY = {
-    **dict.fromkeys(SCENARIOS, 200),
-    **dict.fromkeys(OWNERS, 20),
-    "heavy": 20,
-    "heavy in a current": 20,
-    "owner": 40,
-}
+WEEKLY = {**dict.fromkeys(SCENARIOS, 200), "heavy": 20, "heavy in a current": 20}
 
 
 @cache
 def family() -> int:
     """Return at least the number of promises of all scenarios."""
-    return sum(3 * len(scenario.truths(0)) + 12 for scenario in SCENARIOS.values())
+    return sum(3 * len(scenario.truths()) + 12 for scenario in SCENARIOS.values())
 
 
 def judged() -> Iterator[object]:

@@ -171,7 +171,9 @@ def draw(seed: int, count: int, kind: Kind | None = None) -> Drawn:
 
 def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
     mass, full, arm = random.uniform(6.0, 14.0), random.uniform(18.0, 40.0), random.uniform(0.12, 0.2)
-    turning = mass * random.uniform(0.014, 0.024)
+    length = kind.size ** (1.0 / 3.0)
+    mass, full, arm = mass * kind.size, full * length**2, arm * length
+    turning = mass * random.uniform(0.014, 0.024) * length**2
     added = random.uniform((1.2, 1.5, 1.5, 1.3), (1.6, 2.2, 2.2, 1.9))
     top = random.uniform((1.2, 0.5, 0.6, 3.0), (1.7, 0.8, 1.0, 5.0))
     linear = random.uniform(0.08, 0.25, 4)
@@ -194,7 +196,7 @@ def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
         reverse=random.uniform(0.7, 1.0),
         dead_band=random.uniform(0.02, 0.06),
         loss=random.uniform(0.0, 0.15),
-        lag=random.uniform(0.05, 0.2),
+        lag=random.uniform(0.05, 0.2) * length,
         coupled=count == 4 or kind.has_hidden_sway,
     )
 

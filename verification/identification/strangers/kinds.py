@@ -11,6 +11,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from verification.identification.strangers.water import (
+    HEAVE,
     ROW,
     SURGE,
     SWAY,
@@ -59,6 +60,8 @@ class Kind:
     """True if port and starboard always get the same command."""
     has_table: bool = True
     """False if nobody measured the thrust: rov.toml says about how large it is, 5 % too little."""
+    size: float = 1.0
+    """Its mass relative to that of the others."""
     group: str = "stranger"
     """`stranger`, `hidden` (no log can show it), or `law` (it obeys the equation)."""
 
@@ -248,6 +251,14 @@ def _unsettled(values: Array, random: np.random.Generator) -> Array:
     return found
 
 
+def _waved(columns: dict[int, Array], _: np.random.Generator) -> None:
+    phase = 2.0 * np.pi * ROW * np.arange(len(columns[YAW]))[:, None] / 6.0
+    drift = 0.1 * 2.0 * np.pi / 6.0 * np.cos(phase)
+    columns[SURGE] += drift * np.cos(columns[YAW])
+    columns[SWAY] -= drift * np.sin(columns[YAW])
+    columns[HEAVE] += 0.1 * np.cos(phase)
+
+
 # ---- What the product knows ------------------------------------------------------------------------------------------
 
 
@@ -384,4 +395,10 @@ STRANGERS = (
     ),
 )
 KINDS = (AS_MODELLED, *FAULTS, *STRANGERS)
-BY_NAME = {kind.name: kind for kind in KINDS}
+OTHERS = (
+    Kind("of 2 kg", "the others weigh 6 to 14 kg", size=0.2, group="law", counts=(4,)),
+    Kind("of 100 kg", "the same", size=10.0, group="law", counts=(4,)),
+    Kind("waves", "waves of 10 cm and 6 s carry it along", shown=_waved, counts=(4,)),
+)
+"""Kinds that no seed draws by itself."""
+BY_NAME = {kind.name: kind for kind in (*KINDS, *OTHERS)}
