@@ -10,6 +10,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from inspect import signature
 from pathlib import Path
 from threading import get_ident
 from typing import Any
@@ -156,11 +157,14 @@ def _called(names: Any, parts: Any) -> Any:
 
 def _proper_call(parts: Any) -> Any:
     """A call with as many values as the function takes."""
-    return st.sampled_from(sorted(FIGURES)).flatmap(
-        lambda name: st.lists(parts, min_size=FIGURES[name].least, max_size=min(4, FIGURES[name].most)).map(
-            lambda given: f"{name}({', '.join(given)})"
-        )
-    )
+
+    def calls(name: str) -> Any:
+        parameters = signature(FIGURES[name].compute).parameters.values()
+        least = sum(one.default is one.empty and one.kind is not one.VAR_POSITIONAL for one in parameters)
+        values = st.lists(parts, min_size=least, max_size=4 if name in ("max", "min") else len(parameters))
+        return values.map(lambda given: f"{name}({', '.join(given)})")
+
+    return st.sampled_from(sorted(FIGURES)).flatmap(calls)
 
 
 def _proper(parts: Any) -> Any:

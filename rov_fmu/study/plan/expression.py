@@ -57,20 +57,8 @@ class FigureFunction(NamedTuple):
     """A function that an expression may call."""
 
     compute: Callable[..., _Value]
+    """Its parameters are those that an expression may give, by name unless they stand before a slash."""
     unit: _UnitRule = None
-    least: int = 1
-    """The number of values that it needs."""
-    most: int = 1
-    """The number of values that it takes."""
-    parameters: tuple[str, ...] = ()
-    """The names of all parameters, if values after the first one may be given by name."""
-
-
-def by_name(compute: Callable[..., _Value], unit: _UnitRule) -> FigureFunction:
-    """Return a function whose values may be given by the names of its parameters."""
-    parameters = signature(compute).parameters
-    needed = sum(p.default is p.empty for p in parameters.values())
-    return FigureFunction(compute, unit, needed, len(parameters), tuple(parameters))
 
 
 # ---- Units -----------------------------------------------------------------------------------------------------------
@@ -101,10 +89,10 @@ def _quotient(above: _Unit, below: _Unit) -> _Unit:
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> FigureFunction:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), _common, most=100)
+    return FigureFunction(lambda y, /, *others: reduce(of_two, others, y) if others else of_one(y), _common)
 
 
-def _round(y: _Value, decimals: float = 0.0) -> _Value:
+def _round(y: _Value, decimals: float = 0.0, /) -> _Value:
     if not abs(decimals) <= _MOST_DECIMALS:
         raise ValueError(f"decimals must be within -{_MOST_DECIMALS} ... {_MOST_DECIMALS}")
     return np.round(y, _whole_number(decimals))
@@ -123,22 +111,28 @@ _OF_NUMPY: Mapping[tuple[int, _UnitRule], Sequence[str]] = {
     (3, _common): ("clip",),
     (3, lambda *units: units[-1]): ("interp",),
 }
-"""Functions of NumPy, by the number of their values and the unit of their result. Their other parameters are not
-allowed, because `out`, for example, writes into an array."""
+"""Functions of NumPy, by the number of their values and the unit of their result."""
+_TAKING: Mapping[int, Callable[[Callable[..., _Value]], Callable[..., _Value]]] = {
+    1: lambda of: lambda y, /: of(y),
+    2: lambda of: lambda y, z, /: of(y, z),
+    3: lambda of: lambda x, y, z, /: of(x, y, z),
+}
+"""By the number of values, what keeps a function of NumPy from its other parameters: `out`, for example, writes into an
+array."""
 FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
     {
-        name: FigureFunction(getattr(np, name), unit, count, count)
+        name: FigureFunction(_TAKING[count](getattr(np, name)), unit)
         for (count, unit), names in _OF_NUMPY.items()
         for name in names
     }
     | {
-        "gradient": FigureFunction(lambda y, *t: np.gradient(elements(y), *t), most=2),
-        "len": FigureFunction(lambda y: float(len(y)), "1"),
+        "gradient": FigureFunction(lambda y, t=1.0, /: np.gradient(elements(y), t)),
+        "len": FigureFunction(lambda y, /: float(len(y)), "1"),
         "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
         "min": _of_all(np.min, np.minimum),
-        "round": FigureFunction(_round, unit_of_first, most=2),
-        "sorted": FigureFunction(np.sort, unit_of_first),
-        "where": FigureFunction(lambda *of: np.where(*of)[()], lambda _, *either: _common(*either), 3, 3),
+        "round": FigureFunction(_round, unit_of_first),
+        "sorted": FigureFunction(lambda y, /: np.sort(y), unit_of_first),
+        "where": FigureFunction(lambda x, y, z, /: np.where(x, y, z)[()], lambda _, *either: _common(*either)),
     }
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
@@ -180,12 +174,16 @@ class FigureExpression:
             with warnings.catch_warnings():  # Python's own about the text, such as "1if" without a space
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
+            self.value, unit = self._read(tree.body)
+            """Returns the value, a number or an array, for the values of all names. May raise any exception."""
+        except ExpressionError:
+            raise
         except (RecursionError, MemoryError) as error:
             raise ExpressionError(_TOO_DEEP) from error
-        except (SyntaxError, UnicodeError, ValueError) as error:
+        except OverflowError as error:
+            raise ExpressionError("has a number that is too large") from error
+        except (SyntaxError, ValueError) as error:
             raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
-        self.value, unit = self._read(tree.body)
-        """Returns the value, a number or an array, for the values of all names. May raise any exception."""
         self.unit = unit or ""
         """The unit of the value, or an empty text where it does not follow."""
 
@@ -203,7 +201,7 @@ class FigureExpression:
             case None:
                 return lambda _: None, None
             case ast.Constant(int() | float() as value):
-                number = _constant(value)
+                number = float(value)  # whole numbers would grow without end, and turn into objects in NumPy
                 return lambda _: number, _PLAIN
             case ast.Name(name):
                 return self._variable(name)
@@ -252,27 +250,18 @@ class FigureExpression:
         if not (function := self._functions.get(name)):
             near = did_you_mean(name, self._functions)
             raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{near}")
-        compute, unit, least, most, parameters = function
+        compute, unit = function
         named, count = [k.arg or "**" for k in keywords], len(given)
-        used = [*parameters[:count], *named]
-        is_once = {*parameters[:least]} <= {*used} <= {*parameters} and len({*used}) == len(used)
-        if not (given and is_once and least <= count + len(named) <= most):
-            counts = f"{least} to {most}" if most > least else f"{least}"
-            what = f" ({', '.join(parameters)})" if parameters else ""
-            raise ExpressionError(f"{name} takes {counts} values{what}, each once")
+        form = signature(compute)
+        try:
+            form.bind(*given, **dict.fromkeys(named))
+        except TypeError as error:
+            raise ExpressionError(f"{name}({', '.join(form.parameters)}): {error}") from error
         values = [*given, *(k.value for k in keywords)]
         return self._of(lambda *of: compute(*of[:count], **dict(zip(named, of[count:], strict=True))), unit, *values)
 
 
 # ---- Computing -------------------------------------------------------------------------------------------------------
-
-
-def _constant(value: float) -> float:
-    """Return a number as a float: whole numbers would grow without end, and turn into objects in NumPy."""
-    try:
-        return float(value)
-    except OverflowError:
-        raise ExpressionError("has a number that is too large") from None
 
 
 def _compare(operators: Sequence[Callable[..., _Value]], *values: _Value) -> _Value:

@@ -17,7 +17,7 @@ from rov_fmu.study.plan.expression import (
     FUNCTIONS,
     TIME,
     FigureExpression,
-    by_name,
+    FigureFunction,
     elements,
     unit_of_first,
 )
@@ -41,29 +41,29 @@ class Responses:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
         self.functions = {
-            "V_ss": by_name(self.steady, unit_of_first),
-            "Tau": by_name(self.time_constant, "s"),
-            "overshoot": by_name(self.overshoot, "1"),
-            "settling_time": by_name(self.settling_time, "s"),
-            "at": by_name(self.at, unit_of_first),
-            "final": by_name(self.final, unit_of_first),
+            "V_ss": FigureFunction(self.steady, unit_of_first),
+            "Tau": FigureFunction(self.time_constant, "s"),
+            "overshoot": FigureFunction(self.overshoot, "1"),
+            "settling_time": FigureFunction(self.settling_time, "s"),
+            "at": FigureFunction(self.at, unit_of_first),
+            "final": FigureFunction(self.final, unit_of_first),
         }
         """The functions by their names in an expression."""
 
-    def at(self, y: Array, time: float) -> float:
+    def at(self, y: Array, /, time: float) -> float:
         """Return y at a time, interpolated linearly."""
         self._check_times(time)
         return float(np.interp(time, self._times, y))
 
-    def final(self, y: Array) -> float:
+    def final(self, y: Array, /) -> float:
         """Return the last y."""
         return float(elements(y)[-1])
 
-    def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+    def steady(self, y: Array, /, start: float | None = None, end: float | None = None) -> float:
         """Return the steady y: its mean over the last tenth of the time from `start` to `end`."""
         return self._window(y, start, end)[2]
 
-    def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+    def time_constant(self, y: Array, /, start: float | None = None, end: float | None = None) -> float:
         """Return the time from `start` until 1 - 1/e of the change to the steady value; NaN without a change."""
         t, change = self._change(y, start, end)
         n = int((change >= RISE).argmax())
@@ -72,12 +72,12 @@ class Responses:
         share = (RISE - change[n - 1]) / (change[n] - change[n - 1])  # n is not 0, because the first change is 0
         return float(t[n - 1] + share * (t[n] - t[n - 1]) - t[0])
 
-    def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+    def overshoot(self, y: Array, /, start: float | None = None, end: float | None = None) -> float:
         """Return the largest excess of y over its steady value, divided by its change; NaN without a change."""
         return float(np.maximum(self._change(y, start, end)[1].max() - 1.0, 0.0))
 
     def settling_time(
-        self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
+        self, y: Array, /, start: float | None = None, end: float | None = None, band: float = _BAND
     ) -> float:
         """Return the time from `start` until y stays within a band around its steady value; NaN if it never does.
 

@@ -202,7 +202,7 @@ class _Numbers:
             "grid": self._grid,
             "sobol": self._sobol,
             "saltelli": self._saltelli,
-            "latin-hypercube": self._latin_hypercube,
+            "latin-hypercube": lambda first, end: self._hypercube[first:end],
             "random": self._random,
         }[plan.sampler]
         """Returns the rows from a first run to the one before another."""
@@ -224,10 +224,8 @@ class _Numbers:
     def _sobol(self, first: int, end: int) -> Array:
         """Continue after the last number drawn where possible."""
         source = self._sequence
-        if first < source.num_generated:
-            source.reset()
-        if first > source.num_generated:
-            source.fast_forward(first - source.num_generated)
+        if first != source.num_generated:
+            source.reset().fast_forward(first)
         with warnings.catch_warnings():  # about samples whose length is not a power of two
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(source.random(end - first))
@@ -252,9 +250,6 @@ class _Numbers:
     @cached_property
     def _hypercube(self) -> Array:
         return np.asarray(qmc.LatinHypercube(self._width, seed=self._plan.seed).random(self._runs))
-
-    def _latin_hypercube(self, first: int, end: int) -> Array:
-        return self._hypercube[first:end]
 
     def _random(self, first: int, end: int) -> Array:
         """Draw independent numbers; each run has its own place in the sequence of a generator that can jump."""

@@ -5,7 +5,6 @@ is true: if its rows are those of its name, with their trajectories, if no other
 its pages are right. So parts of a study are files of one folder, wherever they were made: to merge is to copy.
 """
 
-import hashlib
 import json
 import re
 import shutil
@@ -42,7 +41,7 @@ Span = tuple[int, int]
 def parquet(table: pa.Table, study: Mapping[str, Any], first: int) -> bytes:
     """Return the file with the rows of runs from a first one on, which belong to a study."""
     own, span = _identity(study), (first, first + len(table))
-    about = {"digest": _digest(own), "first": span[0], "end": span[1], "study": own}
+    about = {"first": span[0], "end": span[1], "study": own}
     sink = pa.BufferOutputStream()
     told = table.replace_schema_metadata({_ABOUT: json.dumps(about)})
     pq.write_table(told, sink, compression="zstd", write_page_checksum=True)
@@ -197,10 +196,6 @@ def _parts(study: Mapping[str, Any]) -> dict[str, Any]:
     return {**study["plan"], "--engine": study["engine"], "the vehicle, the FMU or rov-fmu": study["fmu"]}
 
 
-def _digest(study: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(study, sort_keys=True).encode()).hexdigest()
-
-
 def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
     """Return the runs of a file. Raises FileError if it cannot count."""
     try:
@@ -208,13 +203,12 @@ def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
             schema, rows = file.schema_arrow, file.read(None if whole else [RUN])[RUN].to_pylist()
         about, has = json.loads(schema.metadata[_ABOUT]), schema.empty_table().flatten().column_names
         span = about["first"], about["end"]
-        is_own, old = about["digest"] == _digest(_identity(study)), _parts(about["study"])
+        old, new = _parts(about["study"]), _parts(_identity(study))
         in_order = rows == [*range(span[0], span[0] + len(rows))] and len(rows) == span[1] - span[0]
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         told = brief(reason_of(error).partition("\n")[0].partition(". ")[0])
         raise FileError(f"{path}: cannot be read: {told}. Remove it, and its runs are done again") from error
-    if not is_own:
-        new = _parts(study)
+    if old != new:
         changed = brief(", ".join(sorted(key for key in {*old, *new} if old.get(key) != new.get(key))))
         raise FileError(f"{path.parents[1]}: holds runs of another study ({changed} changed): choose another folder")
     if not in_order or path.name != _name(span):
