@@ -5,8 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table, text
@@ -19,7 +17,8 @@ from rov_fmu.vehicle.shipped import named_in
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
 
-_SHOWN = (0.05, 0.5, 0.95)
+_SHOWN = ("5%", "50%", "95%", "mean")
+"""What is shown of a figure."""
 _FAILURES = 5
 """The number of reasons that are shown, the most frequent first."""
 
@@ -96,12 +95,10 @@ def print_summary(results: "Results", now: int, seconds: float) -> None:
         rate = per_second(now / max(seconds, 1e-3))
         paragraph(out, f"  {now:,} of them now, in {seconds:.1f} s; {rate}")
     if results.figures:
-        shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
+        shown = table("", "figure", [*_SHOWN, "runs"])
         for name in results.figures:
-            values = runs[name].to_numpy(float)
-            there = values[np.isfinite(values)]
-            quantiles, mean, _ = statistics(there, _SHOWN)
-            shown.add_row(name, *(text(number, ".5g") for number in (*quantiles, mean)), str(there.size))
+            told = statistics(runs[name])
+            shown.add_row(name, *(text(told[key], ".5g") for key in _SHOWN), f"{told['count']:.0f}")
         print_table(shown)
     reasons = runs[REASON].value_counts()
     for reason, count in reasons.head(_FAILURES).items():

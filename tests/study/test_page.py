@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from lxml import html
 
@@ -81,7 +82,8 @@ def test_a_study_of_which_all_runs_failed_has_a_page_and_nothing_to_plot(
     assert "1 of 1 runs, 1 failed, 0 incomplete." in page.xpath("string(//body)")
     assert not page.xpath("//svg")
     assert Results(results).trajectories().empty
-    assert str(statistics(np.array([2.0]), [0.5])) == "([2.0], 2.0, nan)"
+    told = statistics(pd.Series([2.0]))
+    assert (told["count"], told["50%"], told["mean"], str(told["std"])) == (1.0, 2.0, 2.0, "nan")
 
 
 @pytest.mark.long

@@ -132,7 +132,9 @@ FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
         "min": _of_all(np.min, np.minimum),
         "round": FigureFunction(_round, unit_of_first),
         "sorted": FigureFunction(lambda y, /: np.sort(y), unit_of_first),
-        "where": FigureFunction(lambda x, y, z, /: np.where(x, y, z)[()], lambda _, *either: _common(*either)),
+        "where": FigureFunction(
+            lambda x, y, z, /: np.asarray(np.where(x, y, z))[()], lambda _, *either: _common(*either)
+        ),
     }
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""

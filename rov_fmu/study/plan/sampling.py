@@ -224,8 +224,10 @@ class _Numbers:
     def _sobol(self, first: int, end: int) -> Array:
         """Continue after the last number drawn where possible."""
         source = self._sequence
-        if first != source.num_generated:
-            source.reset().fast_forward(first)
+        if first < source.num_generated:
+            source.reset()
+        if first > source.num_generated:
+            source.fast_forward(first - source.num_generated)
         with warnings.catch_warnings():  # about samples whose length is not a power of two
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(source.random(end - first))

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from rov_fmu.io.messages import FileError
@@ -35,8 +34,9 @@ def study_page(results: Results) -> str:
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
-    figures = [_figure(name, results, grid) for name in results.figures]
-    tables, no_indices = _sensitivities(results)
+    told = {name: statistics(runs[name]) for name in (*results.parameters, *results.figures)}
+    figures = [_figure(name, told[name], results, grid) for name in results.figures]
+    tables, no_indices = _sensitivities(results, told)
     rows = [row for found in tables.values() for row in found]
     outputs = results.outputs if len(results.failed) < len(runs) else ()
     return page(
@@ -56,7 +56,7 @@ def study_page(results: Results) -> str:
         bands=[plots.band(name, results) for name in outputs],
         script=inline_script("plots.js"),
         correlated=[group for group in results.groups if len(group) > 1],
-        parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
+        parameters=[_parameter(name, told[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
         more_failures=len(reasons[_REASONS:]),
     )
@@ -69,45 +69,28 @@ def _grid(results: Results) -> Sequence[str]:
     return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
 
 
-def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+def _figure(name: str, told: dict[str, float], results: Results, grid: Sequence[str]) -> dict[str, Any]:
     """Return the row about a figure, with its plot unless all runs have the same value."""
-    values = results.runs[name].to_numpy(float)
-    there = values[np.isfinite(values)]
-    quantiles, mean, sd = statistics(there, QUANTILES)
-    is_still = bool(there.size) and _is_constant(there)
     expression = results.plan["figures"][name]
-    unit = read_expression(expression, results.units).unit
-    plot = None
-    if there.size and not is_still and grid:
+    unit, plot = read_expression(expression, results.units).unit, None
+    if told["count"] and not _is_constant(told) and grid:
         plot = plots.over_grid(name, unit, expression, results, grid)
-    elif there.size and not is_still:
-        plot = plots.distribution(name, there, quantiles, unit, expression)
-    return {
-        "name": name,
-        "expression": expression,
-        "unit": unit,
-        "runs": there.size,
-        "is_still": is_still,
-        "plot": plot,
-        "quantiles": quantiles,
-        "mean": mean,
-        "sd": sd,
-        "ends": statistics(there, (0.0, 1.0))[0],
-    }
+    elif told["count"] and not _is_constant(told):
+        plot = plots.distribution(name, results.runs[name].dropna(), told, unit, expression)
+    own = {"name": name, "expression": expression, "unit": unit, "is_still": _is_constant(told), "plot": plot}
+    return {**told, **own, "quantiles": [told[f"{q:.0%}"] for q in QUANTILES]}
 
 
-def _is_constant(values: Any) -> bool:
-    """True when values are practically constant."""
-    with np.errstate(over="ignore"):
-        return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
+def _is_constant(told: dict[str, float]) -> bool:
+    """True when there are values that are practically constant."""
+    return told["max"] - told["min"] <= _CONSTANT * max(told["max"], -told["min"])
 
 
-def _sensitivities(results: Results) -> tuple[dict[str, Any], dict[str, str]]:
+def _sensitivities(results: Results, told: dict[str, dict[str, float]]) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the rows of Sobol indices by figure, and for the other figures the reason why there are none."""
     found, reasons = dict[str, Any](), dict[str, str]()
     for figure in results.figures if results.plan["sampler"] == "saltelli" else ():
-        there = results.runs[figure].dropna().to_numpy(float)
-        if there.size and _is_constant(there):
+        if _is_constant(told[figure]):
             reasons[figure] = "does not vary"
             continue
         try:
@@ -125,7 +108,7 @@ def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Ser
     return (2.0 * half_width < index.abs()) | (half_width < _SURE)
 
 
-def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:
+def _parameter(name: str, told: dict[str, float], plan: dict[str, Any], results: Results) -> dict[str, Any]:
     """Return the row about a varied variable: how it varies, and the values that it had."""
     distributions = dict(plan["vary"])
     if name in distributions:
@@ -136,13 +119,10 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
     some = [f"{key} {number(value, 4)}".strip() for key, value in pairs]
     if len(some) > _NUMBERS:
         some[_NUMBERS:] = ["…"]
-    least, median, greatest = statistics(column.to_numpy(float), (0.0, 0.5, 1.0))[0]
     return {
+        **told,
         "name": name,
         "planned": f"{kind}: {', '.join(some)}",
-        "least": least,
-        "median": median,
-        "greatest": greatest,
         "unit": results.units[name],
         "description": results.descriptions[name],
     }

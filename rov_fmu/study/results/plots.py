@@ -33,18 +33,16 @@ _BAR = 0.34
 """The height of a bar, as a share of the distance between two variables."""
 
 
-def distribution(name: str, values: Any, quantiles: list[float], unit: str, expression: str) -> dict[str, Any]:
-    """Plot a histogram of the values of a figure with their median, and with the range from their first to their last
-    quantile."""
-    low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
+def distribution(name: str, values: Any, told: dict[str, float], unit: str, expression: str) -> dict[str, Any]:
+    """Plot a histogram of the values of a figure with their median, and with the range from 5 to 95 % of the runs."""
 
     def draw(ax: Axes) -> None:
-        shade(ax, low, high)
+        shade(ax, told["5%"], told["95%"])
         shares = np.full(len(values), 100.0 / len(values))
         bins = min(_BINS, max(5, round(len(values) ** 0.5)))
         _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
         bars.set_label("share")  # type: ignore[union-attr]
-        ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
+        ax.axvline(told["50%"], color=LIGHT["orange"], linewidth=1.4)
         ax.set(xlabel=with_unit("", unit), ylabel="runs (%)")
         _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 

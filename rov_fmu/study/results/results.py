@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -151,13 +150,13 @@ class Results:
             raise FileError(f"{self.folder / RUNS}: {brief(reason_of(error))}") from error
 
 
-def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float]:
-    """Return the quantiles, the mean, and the standard deviation of finite numbers; NaN where there are too few."""
-    if not values.size:
-        return [nan] * len(quantiles), nan, nan
+def statistics(column: "pd.Series[float]") -> dict[str, float]:
+    """Return what pandas tells of the numbers of a column: count, mean, std, min, max, and QUANTILES, such as "5%".
+
+    They are NaN where there are too few.
+    """
     with np.errstate(all="ignore"):
-        sd = float(values.std(ddof=1)) if values.size > 1 else nan
-        return np.quantile(values, quantiles).tolist(), float(values.mean()), sd
+        return column.describe(percentiles=[*QUANTILES]).to_dict()  # type: ignore[return-value]
 
 
 def _others(names: Sequence[str], table: str) -> str:
