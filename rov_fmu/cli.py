@@ -4,12 +4,11 @@ Each command is a short function that imports its modules only when it is called
 fast.
 """
 
-import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from math import inf, isfinite, nan, nextafter
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -31,14 +30,13 @@ from rov_fmu.io.messages import (
     print_message,
     shown,
 )
+from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES, WORKERS, Numbers
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
 if TYPE_CHECKING:
     from rov_fmu.build import Built
 
-_MOST_PARTS = 10_000
-"""The largest number of parts of a study."""
 _EXIT_CODES = {
     FileError: 2,
     InputError: 2,
@@ -105,24 +103,26 @@ class _Choice(click.Choice[Any]):
         return f"Choose one of {', '.join(map(str, self.choices))}."
 
 
-def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float] = float) -> Callable[[str], float]:
-    """Return the type of an option that takes a finite number within bounds; `allowed` describes it in messages."""
+def _one_of(numbers: Numbers) -> Callable[[str], float]:
+    """Return the type of an option that takes one of these numbers."""
 
     def number(text: str) -> float:
         try:
-            value = kind(text)
+            return numbers.checked("", numbers.kind(text))  # type: ignore[no-any-return]
         except ValueError:
-            value = nan
-        if not (low <= value <= high and isfinite(value)):
-            raise click.BadParameter(f"{shown(text)} must be {allowed}")
-        return value
+            raise click.BadParameter(f"{shown(text)} must be {numbers.allowed}") from None
 
     return number
 
 
+def _number(allowed: str, least: float = -inf, most: float = inf, kind: type[float] = float) -> Callable[[str], float]:
+    """Return the type of an option that takes a finite number within bounds; `allowed` describes it in messages."""
+    return _one_of(Numbers(allowed, least, most, kind))
+
+
 def _seconds(least: str) -> Callable[[str], float]:
     """Return the type of an option that takes a time, s."""
-    return _number(f"a number of at least {least} s", low=float(least))
+    return _number(f"a number of at least {least} s", float(least))
 
 
 def _setting(text: str) -> str:
@@ -130,15 +130,6 @@ def _setting(text: str) -> str:
     if "=" not in text:
         raise click.BadParameter(f"{shown(text)} must be NAME=VALUE, such as u_l=0.3")
     return text
-
-
-def _part(text: str) -> tuple[int, int]:
-    """Return the number of a part, and that of all parts."""
-    match = re.fullmatch(r"(\d{1,5})/(\d{1,5})", text)
-    number, count = map(int, match.groups()) if match else (0, 0)
-    if not 1 <= number <= count <= _MOST_PARTS:
-        raise click.BadParameter(f"{shown(text)} must be a part and their number, such as 3/64, at most {_MOST_PARTS}")
-    return number, count
 
 
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
@@ -644,12 +635,12 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
 )
 @click.option(
     "--tolerance",
-    type=_number("a number above 0", nextafter(0.0, 1.0)),
+    type=_one_of(TOLERANCES),
     help="Tolerance instead of that of each experiment.",
 )
 @click.option(
     "--time-limit",
-    type=_number("a number of seconds above 0, at most 1e6", nextafter(0.0, 1.0), 1e6),
+    type=_one_of(TIME_LIMITS),
     metavar="SECONDS",
     default=60.0,
     help="Time for each experiment. The default is 60 s.",
@@ -710,7 +701,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 @_output_option(required=True, metavar="RESULTS", help="Folder of the results.")
 @click.option(
     "--workers",
-    type=_number("a whole number from 1 to 1024", 1, 1024, int),
+    type=_one_of(WORKERS),
     metavar="N",
     help="Number of processes, or of threads for a vehicle. The default is the number of cores.",
 )
@@ -722,7 +713,6 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 )
 @click.option(
     "--part",
-    type=_part,
     metavar="K/N",
     help="Do part K of N alone, as in --part 3/64, also beside others.",
 )
@@ -735,23 +725,17 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
     help="Run to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a vehicle.",
 )
 @_force_option()
-def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, **options: Any) -> None:
+def _study(plan: Path, output: Path, **options: Any) -> None:
     """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.
 
     RESULTS gets the table runs (Parquet) and the page study.html. Runs that are done are kept: the
     same command continues a study that was interrupted.
     """
-    if workers and scheduler is not None:
-        raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
-    if options["engine"] == "lanes" and scheduler is not None:
-        raise click.UsageError("study: leave --scheduler out, because --engine lanes runs in this process")
-    if options["merge"] and options["part"]:
-        raise click.UsageError("study: leave --part out, because --merge does no run")
     try:
         from rov_fmu.study.study_command import study_plan
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
-    study_plan(plan, output, workers, scheduler, **options)
+    study_plan(plan, output, **options)
 
 
 # ---- identify --------------------------------------------------------------------------------------------------------

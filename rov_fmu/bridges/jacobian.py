@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import Array, reasons, simulate
 from rov_fmu.io.messages import InputError, did_you_mean, listed
-from rov_fmu.io.numbers import checked_length
+from rov_fmu.io.numbers import LENGTHS
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SPACINGS = (3e-3, 1e-4, 3e-6)
@@ -71,7 +71,7 @@ def step_jacobian(
     unknown, an input or a state is missing, or h is not a time.
     """
     layout = vehicle.layout
-    checked_length("h", h)
+    LENGTHS.checked("h", h)
     for what, needed, given in (("inputs", layout.inputs, inputs), ("state", layout.state, state)):
         if missing := [name for name in needed if name not in given]:
             raise InputError(f"{what}: {listed(missing)} must be given, too")

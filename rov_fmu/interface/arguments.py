@@ -279,13 +279,6 @@ def checked_paths(key: str, given: str | Path | Sequence[str | Path]) -> list[Pa
     return [Path(path) for path in paths]
 
 
-def checked_workers(workers: object) -> int | None:
-    """Return a number of threads, or None for the default. Raises InputError if it is not a whole number from 1 on."""
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers = {shown(workers)}: must be a whole number from 1 on")
-    return workers
-
-
 def checked_record(record: Sequence[str] | None, layout: Layout, names: Collection[str]) -> list[str]:
     """Return the names of the variables to record. The default is the outputs of the FMU: states and thrust.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.messages import InputError, only, shown
-from rov_fmu.io.numbers import checked_length
+from rov_fmu.io.numbers import LENGTHS, MOTIONS
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.steady import Steady, steady_with
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
@@ -222,7 +222,7 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used.
         """
-        return super().step(self._all_inputs(inputs), self._all_states(state), checked_length("h", h))
+        return super().step(self._all_inputs(inputs), self._all_states(state), LENGTHS.checked("h", h))
 
     def stepper(
         self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None
@@ -265,7 +265,7 @@ class VehicleModel(Vehicle):
         from rov_fmu.autopilot.gains import autopilot_of
         from rov_fmu.autopilot.pilot import Pilot
 
-        return Pilot(autopilot_of(self, checked_length("step", step), delay))
+        return Pilot(autopilot_of(self, LENGTHS.checked("step", step), delay))
 
     def hold(
         self,
@@ -291,7 +291,7 @@ class VehicleModel(Vehicle):
         """
         import numpy as np
 
-        seconds, step = (checked_length(key, x, 1e6) for key, x in (("seconds", seconds), ("step", step)))
+        seconds, step = (MOTIONS.checked(key, x) for key, x in (("seconds", seconds), ("step", step)))
         pilot, stepper = self.autopilot(step).hold(**aims), self.stepper(start=start)
         if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
             raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")

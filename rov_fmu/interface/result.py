@@ -20,11 +20,11 @@ from rov_fmu.interface.arguments import (
     checked_start,
     checked_times,
     checked_values,
-    checked_workers,
     duration_times,
     number_of_vehicles,
 )
 from rov_fmu.io.messages import InputError, UnknownNameError, only
+from rov_fmu.io.numbers import WORKERS
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def simulated_result(
         going = (*layout.state, *layout.continued, *layout.memory)
         others = (*attitude, *layout.continued) if many else (*going, *layout.commands)
         recording = [*recorded, *(name for name in others if name not in recorded)]
-        cores = checked_workers(workers) or usable_cores()
+        cores = usable_cores() if workers is None else WORKERS.checked("workers", workers)
         trajectories = simulate(vehicle, step_times, values, recording, vehicles=vehicles, workers=cores, lanes=lanes)
     except MemoryError as error:
         size = 8e-9 * vehicles * len(step_times) * len(recorded)

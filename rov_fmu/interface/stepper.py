@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.interface.arguments import held_inputs
 from rov_fmu.io.messages import InputError
-from rov_fmu.io.numbers import checked_length
+from rov_fmu.io.numbers import LENGTHS
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -43,7 +43,7 @@ class VehicleStepper:
 
         Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
         """
-        h = checked_length("h", h)
+        h = LENGTHS.checked("h", h)
         values = [*held_inputs(self._stepper.vehicle.layout, inputs, self._saturated).values()]
         try:
             return dict(zip(self._record, self._stepper.step(values, h), strict=True))

@@ -1,8 +1,9 @@
-"""Numbers as text, with the digits that their intervals or their readers need, and lengths of time."""
+"""Numbers as text, with the digits that their intervals or their readers need, and the numbers that arguments take."""
 
 from decimal import Decimal
-from math import floor, inf, isfinite, log10
+from math import floor, inf, isfinite, log10, nextafter
 from numbers import Real
+from typing import Any, NamedTuple
 
 from rov_fmu.io.messages import InputError, shown
 
@@ -42,15 +43,34 @@ def _rounded(number: float, exponent: int) -> str:
     return _plain(+Decimal(number).quantize(Decimal(1).scaleb(exponent)))  # the sign makes 0 of -0
 
 
-def checked_length(key: str, length: float, most: float = inf) -> float:
-    """Return the length of a step or of a motion, s.
+class Numbers(NamedTuple):
+    """The finite numbers that an argument takes: an option of a command, and the keyword of the same name in Python."""
 
-    Raises InputError if it is not above 0, not finite, or above the longest one.
-    """
-    if not (isinstance(length, Real) and 0.0 < length <= most and isfinite(length)):
-        limit = f" and at most {most:g}" if isfinite(most) else ""
-        raise InputError(f"{key} = {shown(length)}: must be a time above 0{limit}, s")
-    return float(length)
+    allowed: str
+    """What they are, in messages."""
+    least: float = -inf
+    most: float = inf
+    kind: type[float] = float
+
+    def checked(self, key: str, given: Any) -> Any:
+        """Return a number of the kind. Raises InputError with the name of the argument about anything else."""
+        is_number = isinstance(given, Real)
+        if is_number and self.least <= given <= self.most and isfinite(given) and (of := self.kind(given)) == given:
+            return of
+        raise InputError(f"{key} = {shown(given)}: must be {self.allowed}")
+
+
+ABOVE_0 = nextafter(0.0, 1.0)
+LENGTHS = Numbers("a time above 0, s", ABOVE_0)
+"""The length of a step or of a motion."""
+MOTIONS = Numbers("a time above 0 and at most 1e+06, s", ABOVE_0, 1e6)
+"""The length of a motion in steps, and of each."""
+WORKERS = Numbers("a whole number from 1 to 1024", 1, 1024, int)
+"""The number of processes or of threads."""
+TIME_LIMITS = Numbers("a number of seconds above 0, at most 1e6", ABOVE_0, 1e6)
+"""The time that the program of a stranger may take."""
+TOLERANCES = Numbers("a number above 0", ABOVE_0)
+"""A relative tolerance."""
 
 
 def significant(number: float, digits: int) -> str:

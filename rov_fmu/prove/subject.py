@@ -15,6 +15,7 @@ from rov_fmu.io.child_process import ChildProcess
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
+from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES
 from rov_fmu.io.reading import open_file
 from rov_fmu.prove.experiments import (
     DEFAULT_STEPS,
@@ -113,13 +114,16 @@ def opened(
     *,
     needs_results: bool = False,
 ) -> Iterator[Subject]:
-    """Unpack an FMU of any exporter for a while. Raises FileError.
+    """Unpack an FMU of any exporter for a while. Raises FileError, and InputError about a number.
 
     With `needs_results`, it raises NoResultsError, a FileError, if the FMU carries no expected results.
     """
     import fmpy
 
     check_suffix(fmu, FMU)
+    TIME_LIMITS.checked("time_limit", time_limit)
+    if tolerance is not None:
+        TOLERANCES.checked("tolerance", tolerance)
     experiments = list[Experiment]()
     with temporary_folder("fmu-") as folder:
         with open_file(fmu) as file:

@@ -26,11 +26,9 @@ _FAILURES = 5
 def study_plan(
     plan: Path,
     output: Path,
-    workers: int | None,
-    scheduler: str | None,
-    run: int | None,
-    part: tuple[int, int] | None,
     *,
+    run: int | None,
+    part: str | None,
     force: bool,
     **how: Any,
 ) -> None:
@@ -52,8 +50,6 @@ def study_plan(
         work = do_study(
             plan,
             output,
-            workers,
-            scheduler,
             StudyParts(shown).update,
             lambda message: shown.print(f"warning: {message}"),
             part=part,
@@ -61,7 +57,7 @@ def study_plan(
             **how,
         )
     if part:
-        words = f"part {part[0]} of {part[1]} is complete: {work.runs} runs now, {work.failed} failed"
+        words = f"part {part.replace('/', ' of ')} is complete: {work.runs} runs now, {work.failed} failed"
         paragraph(console(), f"{shell_words(output)}: {words}")
         return
     from rov_fmu.interface.model import load

@@ -1,13 +1,16 @@
 """Mistakes of a user: one line that says what is wrong, what is allowed, and what was probably meant."""
 
+import re
 import shlex
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 import pytest
 
+from rov_fmu import InputError, prove_fmu, run_study
 from rov_fmu.cli import _commands, main
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS
@@ -139,6 +142,24 @@ def test_numbers_are_accepted_up_to_their_limits(words: str) -> None:
     for value in (below, above):
         with pytest.raises(click.BadParameter, match=f"^{value!r} must be "):
             _commands.commands[name].make_context(name, [*rest, value])
+
+
+KEYWORDS: dict[str, tuple[Callable[..., object], tuple[object, ...]]] = {
+    "workers": (run_study, (0, 1025, 2.5, "2", float("inf"))),
+    "part": (run_study, ((0, 3), (5, 3), (1, 10_001), 3, "3-64", "1/")),
+    "engine": (run_study, ("c",)),
+    "tolerance": (prove_fmu, (0.0, -1.0, float("nan"), "1e-6")),
+    "time_limit": (prove_fmu, (0, 1e7, None)),
+}
+"""Keywords of functions in Python, with values that the option of the same name does not take either."""
+
+
+@pytest.mark.parametrize("name", KEYWORDS)
+def test_a_keyword_takes_what_the_option_of_its_name_takes(name: str) -> None:
+    function, wrong = KEYWORDS[name]
+    for value in wrong:
+        with pytest.raises(InputError, match=rf"^{name} = {re.escape(repr(value))}: must be "):
+            function("nowhere.fmu", **({"folder": "r"} if function is run_study else {}), **{name: value})
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc is of Linux")

@@ -298,7 +298,7 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: step_jacobian(v, {"u_l": 0.3}, v.layout.at_rest, 1.0),
         "inputs: u_r, u_t, X_ext, .* must be given, too",
     ),
-    "no workers": (lambda v: v.simulate_many(TIMES, workers=0), "workers = 0: must be a whole number from 1 on"),
+    "no workers": (lambda v: v.simulate_many(TIMES, workers=0), "workers = 0: must be a whole number from 1 to 1024"),
     "per vehicle and not per time": (
         lambda v: v.simulate_many(TIMES, {"u_l": np.full(1000, 0.1)}),
         r"inputs\['u_l'\]: .* or \(vehicles, 1\), or \(vehicles, 3\), and has the shape \(1000,\)",

@@ -189,7 +189,7 @@ def test_more_runs_of_the_same_plan_go_on_and_fewer_are_refused(
     draft.write_bytes(b"of a process that was killed")
     same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
-    assert do_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append).runs == 0
+    assert do_study(tmp_path / "plan.toml", results, progress.append, scheduler="tcp://nowhere").runs == 0
     assert not draft.exists()
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()

@@ -119,7 +119,7 @@ def _study(folder: Path, runs: int) -> list[str]:
     plan = folder / "plan.toml"
     plan.write_text(_PLAN.format(runs=runs), encoding="utf-8")
     with tempfile.TemporaryDirectory(dir=folder) as results:
-        work = do_study(plan, Path(results, "results"), 2, None, lambda _: looks.append(_look()))
+        work = do_study(plan, Path(results, "results"), lambda _: looks.append(_look()), workers=2)
     processor, clock = (last - first for first, last in zip(looks[0], looks[-1], strict=True))
     return [f"{runs:,} runs", duration(processor / runs), duration(clock), duration(work.started)]
 

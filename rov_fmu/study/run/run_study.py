@@ -1,13 +1,15 @@
 """A study from its plan to its results."""
 
+import re
 import sys
 from collections.abc import Callable
 from multiprocessing import current_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rov_fmu.fmus.instance import LoadError
-from rov_fmu.io.messages import FileError
+from rov_fmu.io.messages import FileError, InputError, shown
+from rov_fmu.io.numbers import WORKERS
 from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
 
 Engine = Literal["lanes", "fmu"]
+_MOST_PARTS = 10_000
+"""The largest number of parts of a study."""
 
 
 def run_study(
@@ -32,7 +36,7 @@ def run_study(
     workers: int | None = None,
     scheduler: str | None = None,
     engine: Engine | None = None,
-    part: tuple[int, int] | None = None,
+    part: tuple[int, int] | str | None = None,
     merge: bool = False,
     on_progress: Callable[[StudyProgress], None] = lambda _: None,
 ) -> "Results":
@@ -43,7 +47,7 @@ def run_study(
     - `scheduler`: the address of a Dask scheduler that is used instead.
     - `engine`: "lanes" for a vehicle in this process, the default for a plan with `vehicle` and no scheduler; "fmu" for
       its FMU on Dask workers. The rows are equal within rounding.
-    - `part`: (3, 64) for the third of 64 parts, which may run beside each other.
+    - `part`: (3, 64), or "3/64", for the third of 64 parts, which may run beside each other.
     - `merge`: True to do no run, and check that the files of all runs are in `folder`.
     - `on_progress`: called with the state of the runs.
 
@@ -51,27 +55,28 @@ def run_study(
 
     Dask's workers import the calling script, so a script must call this below `if __name__ == "__main__":`.
 
-    Raises FileError with a line for each reason, BuildError if a vehicle cannot be compiled, StudyError if the workers
-    are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.
+    Raises FileError with a line for each reason, InputError about an argument, BuildError if a vehicle cannot be
+    compiled, StudyError if the workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the
+    same call continues from there.
     """
     if getattr(current_process(), "_inheriting", False):
         sys.exit(1)  # a worker imports a script without that line; its parent prints the message
     from rov_fmu.study.results.results import Results
 
-    work = do_study(Path(plan), Path(folder), workers, scheduler, on_progress, engine=engine, part=part, merge=merge)
-    return Results(work.store.folder)
+    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "engine": engine, "part": part, "merge": merge}
+    return Results(do_study(Path(plan), Path(folder), on_progress, **how).store.folder)
 
 
 def do_study(
     path: Path,
     folder: Path,
-    workers: int | None,
-    scheduler: str | None,
     on_progress: Callable[[StudyProgress], None] = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
     *,
+    workers: int | None = None,
+    scheduler: str | None = None,
     engine: Engine | None = None,
-    part: tuple[int, int] | None = None,
+    part: tuple[int, int] | str | None = None,
     merge: bool = False,
     force: bool = False,
 ) -> Work:
@@ -80,12 +85,25 @@ def do_study(
     `on_warning` is called with each warning. `force` allows replacing the work of others that has the name of a file of
     the results.
     """
+    number, parts = _numbers_of(part)
+    if workers is not None:
+        WORKERS.checked("workers", workers)
+    if engine not in (None, *get_args(Engine)):
+        raise InputError(f"engine = {shown(engine)}: must be one of {', '.join(get_args(Engine))}")
+    has_scheduler = scheduler is not None
+    for is_wrong, words in (
+        (has_scheduler and workers, "leave --workers out, because the scheduler already has its workers"),
+        (has_scheduler and engine == "lanes", "leave --scheduler out, because --engine lanes runs in this process"),
+        (merge and part, "leave --part out, because --merge does no run"),
+    ):
+        if is_wrong:
+            raise InputError(f"study: {words}")
     plan = load_plan(path)
     model = _model(plan, path, engine or ("lanes" if plan.vehicle and scheduler is None else "fmu"))
     study, design = prepare(plan, path, model)
     for warning in study.about["warnings"]:
         on_warning(warning)
-    store, (number, parts) = Store(folder, force=force), part or (1, 1)
+    store = Store(folder, force=force)
     span = (number - 1) * design.runs // parts, number * design.runs // parts
     with store.held(f"-{number}-of-{parts}" if part else ""):
         missing = store.describe(study.about, span)
@@ -106,6 +124,16 @@ def do_study(
     if isinstance(model, SystemModel) and work.runs and (words := half_step_words(study, model)):
         on_warning(words)
     return work
+
+
+def _numbers_of(part: tuple[int, int] | str | None) -> tuple[int, int]:
+    """Return the number of a part, and that of all parts. Raises InputError."""
+    text = "1/1" if part is None else str(part).strip("()").replace(", ", "/")
+    match = re.fullmatch(r"(\d{1,5})/(\d{1,5})", text)
+    number, count = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= number <= count <= _MOST_PARTS:
+        raise InputError(f"part = {shown(part)}: must be a part and their number, such as 3/64, at most {_MOST_PARTS}")
+    return number, count
 
 
 def _model(plan: Plan, path: Path, engine: Engine) -> Model:
