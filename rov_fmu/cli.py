@@ -30,7 +30,7 @@ from rov_fmu.io.messages import (
     print_message,
     shown,
 )
-from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES, WORKERS, Numbers
+from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES, WORKERS, NumberRange
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
@@ -103,7 +103,7 @@ class _Choice(click.Choice[Any]):
         return f"Choose one of {', '.join(map(str, self.choices))}."
 
 
-def _one_of(numbers: Numbers) -> Callable[[str], float]:
+def _one_of(numbers: NumberRange) -> Callable[[str], float]:
     """Return the type of an option that takes one of these numbers."""
 
     def number(text: str) -> float:
@@ -117,7 +117,7 @@ def _one_of(numbers: Numbers) -> Callable[[str], float]:
 
 def _number(allowed: str, least: float = -inf, most: float = inf, kind: type[float] = float) -> Callable[[str], float]:
     """Return the type of an option that takes a finite number within bounds; `allowed` describes it in messages."""
-    return _one_of(Numbers(allowed, least, most, kind))
+    return _one_of(NumberRange(allowed, least, most, kind))
 
 
 def _seconds(least: str) -> Callable[[str], float]:

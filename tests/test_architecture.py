@@ -80,7 +80,7 @@ LARGER_FOLDERS = {
 """The folders that have more than a dozen modules, without their __init__.py."""
 
 
-SHARED = {"Answer", "Part", "Plan", "Rov", "Table", "Variable", "check", "load", "place", "step", "table_of"}
+SHARED = {"Rov", "load", "place", "step"}
 """The names of classes and functions that two modules have."""
 
 

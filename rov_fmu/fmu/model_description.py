@@ -9,7 +9,7 @@ from rov_fmu.equation.dependencies import parameters_of
 from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.card import card_text
 from rov_fmu.fmu.terminals import terminals_and_icons
-from rov_fmu.fmu.variables import LOG_CATEGORIES, FmuModel, Variable, variables
+from rov_fmu.fmu.variables import LOG_CATEGORIES, DeclaredVariable, FmuModel, variables
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -59,7 +59,7 @@ def model_description(
     description = ". ".join(filter(None, (model.summary, " ".join(notes))))
     declared = model.variables
     if fmi == 3:
-        declared = (*declared, Variable("time", len(declared), "Time", "s", "independent", "continuous"))
+        declared = (*declared, DeclaredVariable("time", len(declared), "Time", "s", "independent", "continuous"))
     number, type_names = {v.name: v.index for v in declared}, _type_names(declared)
     return render(
         "modelDescription.xml.j2",
@@ -87,7 +87,7 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-def _type_names(variables: Sequence[Variable]) -> dict[str, str]:
+def _type_names(variables: Sequence[DeclaredVariable]) -> dict[str, str]:
     """Return the name of the type of each variable by the variable's name: its quantity.
 
     Types of the same quantity that differ in range, display unit or nominal value are numbered.
@@ -113,14 +113,14 @@ _Elements = dict[str, dict[str, str]]
 
 
 def _structure(
-    declared: tuple[Variable, ...], parameters: Mapping[str, Collection[str]], names: tuple[str, str, str]
+    declared: tuple[DeclaredVariable, ...], parameters: Mapping[str, Collection[str]], names: tuple[str, str, str]
 ) -> dict[str, _Elements]:
     """Return the lists of <ModelStructure> by name. `parameters` are those of `Model.parameters_of`."""
     order = {v.name: v.index for v in declared}
     lists: dict[str, _Elements] = {name: {} for name in names}
     outputs, derivatives, initial = lists.values()
 
-    def add(to: _Elements, variable: Variable, known: Mapping[str, str]) -> None:
+    def add(to: _Elements, variable: DeclaredVariable, known: Mapping[str, str]) -> None:
         to[variable.name] = dict(sorted(known.items(), key=lambda item: order[item[0]]))
 
     for v in declared:

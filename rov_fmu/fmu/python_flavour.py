@@ -11,14 +11,14 @@ from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.equation.python import step
 from rov_fmu.equation.python.printed import printed
 from rov_fmu.equation.words import AFLOAT, LEFT_WATER
-from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
+from rov_fmu.fmu.variables import LOG_CATEGORIES, DeclaredVariable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SLAVE = Path(__file__).with_name("slave.py")
 _STEP = Path(step.__file__).parent
 
 
-def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
+def python_sources(vehicle: Vehicle, variables: tuple[DeclaredVariable, ...]) -> Mapping[str, str]:
     """Return the files of this project in resources/ by name: the slave, the variables in JSON, the step, the equation.
 
     The modules are named after the vehicle, because all FMUs and the user's own code share one interpreter.

@@ -22,7 +22,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
-class Variable:
+class DeclaredVariable:
     """A scalar variable with the attributes of FMI. Its type is Real in FMI 2.0 and Float64 in FMI 3.0.
 
     `dependencies` maps each known that the variable depends on to its dependenciesKind, for outputs and derivatives.
@@ -103,7 +103,7 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
     )
 
 
-def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
+def variables(vehicle: Vehicle) -> tuple[DeclaredVariable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
     coefficients = vehicle.layout.coefficients
     return tuple(
@@ -118,15 +118,15 @@ def units_of(layout: Layout) -> dict[str, str]:
 
 
 @lru_cache(maxsize=100)
-def _variables_of(layout: Layout) -> tuple[Variable, ...]:
+def _variables_of(layout: Layout) -> tuple[DeclaredVariable, ...]:
     """Return the variables of the vehicles with a layout, without the values of the coefficients."""
-    result: dict[str, Variable] = {}
+    result: dict[str, DeclaredVariable] = {}
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
         low, high = (x if isfinite(x) else None for x in (declaration.minimum, declaration.maximum))
         given = {"display_unit": declaration.display_unit, "minimum": low, "maximum": high, **rest}
         about = declaration.description, declaration.unit
-        result[name] = Variable(name, layout.places[name], *about, causality, variability, **given)
+        result[name] = DeclaredVariable(name, layout.places[name], *about, causality, variability, **given)
 
     for name, declaration in layout.inputs.items():
         variability = "discrete" if name in layout.acting else "continuous"
@@ -177,7 +177,7 @@ class FmuModel:
     summary: str
     card: str
     """The model card as text."""
-    variables: tuple[Variable, ...]
+    variables: tuple[DeclaredVariable, ...]
     terminals: bytes
     """The document terminalsAndIcons.xml."""
     c_files: Mapping[str, str] = field(default_factory=dict)

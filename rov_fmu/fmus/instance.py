@@ -46,7 +46,7 @@ class CallError(RunError):
 
 
 @dataclass(frozen=True)
-class Table:
+class VariableTable:
     """Variables of one type with their values, in one row or in a row for each point in time."""
 
     names: list[str]
@@ -112,7 +112,7 @@ class Instance:
         """Return the values of variables. Raises CallError."""
         found: dict[str, Any] = {}
         for table in self._kept(tuple(names)):
-            check(table.get(0), "reading values", self.time)
+            check_status(table.get(0), "reading values", self.time)
             found |= zip(table.names, table.values[0].tolist(), strict=True)
         return [found[name] for name in names]
 
@@ -120,14 +120,14 @@ class Instance:
         """Set variables. Raises CallError."""
         for table in self._kept(tuple(values)):
             table.values[0] = [values[name] for name in table.names]
-            check(table.set(0), "setting values", self.time)
+            check_status(table.set(0), "setting values", self.time)
 
-    def tables(self, names: Iterable[str], rows: int = 1) -> list[Table]:
+    def tables(self, names: Iterable[str], rows: int = 1) -> list[VariableTable]:
         """Return tables of variables, one for each of their types, whose values are 0 or None at first."""
         by_type = grouped((self._unpacked.variables[name].type, name) for name in names)
         return [self._table(kind, some, rows) for kind, some in by_type.items()]
 
-    def _table(self, kind: str, names: list[str], rows: int) -> Table:
+    def _table(self, kind: str, names: list[str], rows: int) -> VariableTable:
         variables = [self._unpacked.variables[name] for name in names]
         references = np.array([v.reference for v in variables], np.uint32)
         values = np.zeros((rows, len(names)), variables[0].dtype)
@@ -148,7 +148,7 @@ class Instance:
             return of_row
 
         if kind != "String":
-            return Table(names, values, call("Get"), call("Set"))
+            return VariableTable(names, values, call("Get"), call("Set"))
 
         def get(row: int) -> int:
             values[row] = self.fmu.getString(references.tolist())
@@ -158,7 +158,7 @@ class Instance:
             self.fmu.setString(references.tolist(), values[row].tolist())
             return 0
 
-        return Table(names, values, get, put)
+        return VariableTable(names, values, get, put)
 
     def begin(
         self,
@@ -181,7 +181,7 @@ class Instance:
             inputs()
             self.fmu.exitInitializationMode()
         except FMICallException as error:
-            check(error.status, "initialization")
+            check_status(error.status, "initialization")
 
     def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> Callable[[], object]:
         """Tell the instance the times of a run, s, and return the function with which its initialization begins.
@@ -198,7 +198,7 @@ class Instance:
 
     def step(self, time: float, length: float) -> None:
         """Take a step. Raises CallError."""
-        check(self.do_step(time, length), "the step", time)
+        check_status(self.do_step(time, length), "the step", time)
         self.time = time + length
 
     def free(self) -> None:
@@ -237,7 +237,7 @@ class Instance:
         return step
 
 
-def check(status: int, what: str, time: float | None = None) -> None:
+def check_status(status: int, what: str, time: float | None = None) -> None:
     """Raise CallError if a status is worse than a warning."""
     if status > WARNING:
         error = CallError(f"{what}{'' if time is None else f' at {time:.6g} s'}: {status_word(status)}")

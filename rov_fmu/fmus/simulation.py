@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.fmus.instance import WARNING, Array, CallError, Instance, RunError, Unpacked, check, last_message
+from rov_fmu.fmus.instance import WARNING, Array, CallError, Instance, RunError, Unpacked, check_status, last_message
 from rov_fmu.io.messages import brief
 
 
@@ -87,24 +87,24 @@ class Simulation:
         reads = [table.get for table in self._reads]
         self._instance.begin(times[0], times[-1], self._tolerance, self._set_start, self._set_first)
         for get in reads:
-            check(get(0), "reading", times[0])
+            check_status(get(0), "reading", times[0])
         for n in range(len(times) - 1):
             for put, row in changes.get(n, ()):
                 if (status := put(row)) > WARNING:
-                    check(status, "setting the inputs", times[n])
+                    check_status(status, "setting the inputs", times[n])
             if (status := do_step(times[n], step)) > WARNING:
-                check(status, "the step", times[n])
+                check_status(status, "the step", times[n])
             for get in reads:
                 if (status := get(n + 1)) > WARNING:
-                    check(status, "reading", times[n + 1])
+                    check_status(status, "reading", times[n + 1])
 
     def _set_start(self) -> None:
         for table in self._start:
-            check(table.set(0), "setting the start values")
+            check_status(table.set(0), "setting the start values")
 
     def _set_first(self) -> None:
         for put, row in self._changes.get(0, ()):
-            check(put(row), "setting the inputs", self._times[0])
+            check_status(put(row), "setting the inputs", self._times[0])
 
     def _with_message(self, values: Sequence[float]) -> str:
         """Repeat a failed run with logging on, and return the reason with the FMU's last warning."""

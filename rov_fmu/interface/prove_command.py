@@ -17,7 +17,7 @@ from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
 from rov_fmu.prove.proof import prove_fmu
-from rov_fmu.prove.runs import Plan
+from rov_fmu.prove.runs import PlannedRun
 from rov_fmu.prove.signature import signature_path
 from rov_fmu.prove.subject import Subject
 from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
@@ -105,12 +105,12 @@ def _energies(
     with subject.runs() as child:
 
         def accelerations(**load: float) -> Any:
-            return child.call("run", Plan(0.0, ((1e-3, inputs | load),), free, rates), 1)[0]
+            return child.call("run", PlannedRun(0.0, ((1e-3, inputs | load),), free, rates), 1)[0]
 
         still = accelerations()
         mass = np.linalg.inv(np.column_stack([accelerations(**{axis.external: 1.0}) - still for axis in axes]))
         glides = [
-            child.call("run", Plan(0.0, ((_GLIDE, inputs),), {**parameters, **begin}, velocities), _GLIDE_STEPS)
+            child.call("run", PlannedRun(0.0, ((_GLIDE, inputs),), {**parameters, **begin}, velocities), _GLIDE_STEPS)
             for parameters in (free, braked)
         ]
     return [0.5 * np.einsum("ti,ij,tj->t", v, mass, v) for v in glides]

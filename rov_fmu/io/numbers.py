@@ -43,7 +43,7 @@ def _rounded(number: float, exponent: int) -> str:
     return _plain(+Decimal(number).quantize(Decimal(1).scaleb(exponent)))  # the sign makes 0 of -0
 
 
-class Numbers(NamedTuple):
+class NumberRange(NamedTuple):
     """The finite numbers that an argument takes: an option of a command, and the keyword of the same name in Python."""
 
     allowed: str
@@ -61,15 +61,15 @@ class Numbers(NamedTuple):
 
 
 ABOVE_0 = nextafter(0.0, 1.0)
-LENGTHS = Numbers("a time above 0, s", ABOVE_0)
+LENGTHS = NumberRange("a time above 0, s", ABOVE_0)
 """The length of a step or of a motion."""
-MOTIONS = Numbers("a time above 0 and at most 1e+06, s", ABOVE_0, 1e6)
+MOTIONS = NumberRange("a time above 0 and at most 1e+06, s", ABOVE_0, 1e6)
 """The length of a motion in steps, and of each."""
-WORKERS = Numbers("a whole number from 1 to 1024", 1, 1024, int)
+WORKERS = NumberRange("a whole number from 1 to 1024", 1, 1024, int)
 """The number of processes or of threads."""
-TIME_LIMITS = Numbers("a number of seconds above 0, at most 1e6", ABOVE_0, 1e6)
+TIME_LIMITS = NumberRange("a number of seconds above 0, at most 1e6", ABOVE_0, 1e6)
 """The time that the program of a stranger may take."""
-TOLERANCES = Numbers("a number above 0", ABOVE_0)
+TOLERANCES = NumberRange("a number above 0", ABOVE_0)
 """A relative tolerance."""
 
 

@@ -45,10 +45,10 @@ class Strict(BaseModel):
 
 
 DOCUMENTED = ConfigDict(use_attribute_docstrings=True)
-"""The `model_config` of a class that adds keys with docstrings to a base made by `table_of`."""
+"""The `model_config` of a class that adds keys with docstrings to a base made by `table_model`."""
 
 
-def table_of(
+def table_model(
     name: str, base: type[Strict], fields: Mapping[str, Any], words: str | None = None, needed: Sequence[str] = ()
 ) -> Any:
     """Return a table whose fields are computed. Its JSON schema says that the needed ones must be there.

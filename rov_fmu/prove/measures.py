@@ -13,7 +13,7 @@ from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, capitalized, listed
 from rov_fmu.prove.proof import compare, least_divisor
-from rov_fmu.prove.runs import Answer
+from rov_fmu.prove.runs import Reaction
 from rov_fmu.prove.subject import Subject
 
 Result = Literal["holds", "fails", "measured", "does not apply"]
@@ -241,14 +241,14 @@ def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
         yield what, ("step_tried", length)
 
 
-def _asked(subject: Subject, method: str, argument: Any) -> Answer:
+def _asked(subject: Subject, method: str, argument: Any) -> Reaction:
     """Return the answer of the FMU. One that ends its process, or does not answer in time, has not refused."""
     try:
         with subject.runs(min(_WAIT, subject.time_limit)) as child:
-            answer: Answer = child.call(method, subject.plan, argument)
+            answer: Reaction = child.call(method, subject.plan, argument)
             return answer
     except (ChildError, RunError) as error:
-        return Answer(len(argument) if method == "values_tried" else 1, 0, 0, brief(f"it {error}", 160))
+        return Reaction(len(argument) if method == "values_tried" else 1, 0, 0, brief(f"it {error}", 160))
 
 
 def _beyond(low: float, high: float) -> float | None:

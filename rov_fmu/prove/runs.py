@@ -24,7 +24,7 @@ from rov_fmu.io.messages import brief
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlannedRun:
     """A simulation in pieces, in each of which the inputs are held."""
 
     start: float
@@ -47,7 +47,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reaction:
     """How an FMU answered when something impossible was asked of it."""
 
     tried: int
@@ -62,7 +62,7 @@ class Answer:
 class Runs(Unpacked):
     """An unpacked FMU. A child process has it, because an FMU may end its process."""
 
-    def run(self, plan: Plan, steps: int) -> Array:
+    def run(self, plan: PlannedRun, steps: int) -> Array:
         """Return the outputs before the first step and after each one, a row for each; `steps` are those of a piece.
 
         Every run has an instance of its own. Raises RunError.
@@ -72,7 +72,7 @@ class Runs(Unpacked):
             rows += (fmu.read(plan.outputs) for _ in self._durations(fmu, plan, steps))
         return np.array(rows, dtype=np.float64)
 
-    def durations(self, plan: Plan, steps: int, most: float) -> list[float]:
+    def durations(self, plan: PlannedRun, steps: int, most: float) -> list[float]:
         """Return the duration of each step of a run, s. The run begins anew until `most` seconds have passed."""
         durations = list[float]()
         began = perf_counter()
@@ -84,7 +84,7 @@ class Runs(Unpacked):
                         break
         return durations
 
-    def _durations(self, fmu: Instance, plan: Plan, steps: int) -> Iterator[float]:
+    def _durations(self, fmu: Instance, plan: PlannedRun, steps: int) -> Iterator[float]:
         """Take the steps of a plan, with the inputs of each piece, and yield the duration of each step, s."""
         start = plan.start
         for end, inputs in plan.pieces:
@@ -95,21 +95,21 @@ class Runs(Unpacked):
                 yield perf_counter() - begin
             start = end
 
-    def values_tried(self, plan: Plan, values: Sequence[tuple[str, float]]) -> Answer:
+    def values_tried(self, plan: PlannedRun, values: Sequence[tuple[str, float]]) -> Reaction:
         """Set impossible values of inputs after the initialization, or of parameters during it, one after another."""
         is_input = self.variables[values[0][0]].causality == "input"
         with self._instance(plan, initialized=is_input, logging=True) as fmu:
             answers = [self._asked(fmu, [name], partial(fmu.set, {name: value})) for name, value in values]
         refusals = [answer for answer in answers if answer.refused]
         kept = sum(answer.kept for answer in refusals)
-        return Answer(len(values), len(refusals), kept, (refusals or answers)[-1].words)
+        return Reaction(len(values), len(refusals), kept, (refusals or answers)[-1].words)
 
-    def step_tried(self, plan: Plan, length: float) -> Answer:
+    def step_tried(self, plan: PlannedRun, length: float) -> Reaction:
         """Take a step of an impossible length at the start."""
         with self._instance(plan, logging=True) as fmu:
             return self._asked(fmu, plan.outputs, partial(fmu.step, plan.start, length))
 
-    def _asked(self, fmu: Instance, names: Sequence[str], call: Callable[[], object]) -> Answer:
+    def _asked(self, fmu: Instance, names: Sequence[str], call: Callable[[], object]) -> Reaction:
         """Return the answer to a call that should change none of these variables.
 
         After an error, FMI lets an FMU refuse to be read.
@@ -122,14 +122,14 @@ class Runs(Unpacked):
         except CallError as error:
             words = brief(status_word(error.status) + last_message(": "), 200) if error.status else str(error)
         if not words:
-            return Answer(1, 0, 0, status_word(0))
+            return Reaction(1, 0, 0, status_word(0))
         forget_message()
         with suppress(CallError):
             now = fmu.read(names)
-        return Answer(1, 1, int(np.array_equal(now, before, equal_nan=True)), words)
+        return Reaction(1, 1, int(np.array_equal(now, before, equal_nan=True)), words)
 
     @contextmanager
-    def _instance(self, plan: Plan, *, initialized: bool = True, logging: bool = False) -> Iterator[Instance]:
+    def _instance(self, plan: PlannedRun, *, initialized: bool = True, logging: bool = False) -> Iterator[Instance]:
         """Yield an instance with the start values of a plan, initialized or in the initialization. Raises RunError."""
         from fmpy.fmi1 import FMICallException
         from fmpy.simulation import apply_start_values

@@ -25,7 +25,7 @@ from rov_fmu.prove.experiments import (
     NoResultsError,
     read_experiments,
 )
-from rov_fmu.prove.runs import Plan, Runs
+from rov_fmu.prove.runs import PlannedRun, Runs
 
 _TOOL = "rov-fmu "
 """The beginning of the generation tool of our FMUs."""
@@ -84,13 +84,13 @@ class Subject(Described):
         return self.tolerance or own or DEFAULT_TOLERANCE
 
     @cached_property
-    def plan(self) -> Plan:
+    def plan(self) -> PlannedRun:
         """The simulation to repeat: an experiment, or the default experiment with the inputs at their start values."""
         outputs = self.numbers("output")
         if experiment := self.experiment:
-            return Plan(experiment.start, _pieces(experiment), dict(experiment.parameters), outputs)
+            return PlannedRun(experiment.start, _pieces(experiment), dict(experiment.parameters), outputs)
         start, stop = self._default("startTime"), self._default("stopTime")
-        return Plan(start, ((stop if stop > start else start + 1.0, {}),), {}, outputs)
+        return PlannedRun(start, ((stop if stop > start else start + 1.0, {}),), {}, outputs)
 
     @property
     def words(self) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ValidationInfo, WithJsonSchema
 
 from rov_fmu.equation.catalogue import BY_LETTER, BY_VELOCITY, Axis, Declaration, cross_name
-from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, numbers_schema, table_of
+from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, numbers_schema, table_model
 
 
 def _cross_symbol(text: str) -> str:
@@ -77,7 +77,7 @@ def quantity(name: str, declaration: Declaration, negative: str = "") -> Any:
         ),
         "unit": (Literal[declaration.unit], ...),
     }
-    return table_of(name, Quantity, fields, declaration.description)
+    return table_model(name, Quantity, fields, declaration.description)
 
 
 # ---- Fossen's notation -----------------------------------------------------------------------------------------------

@@ -54,7 +54,7 @@ from rov_fmu.io.toml_file import (
     folder_of,
     numbers_schema,
     rule,
-    table_of,
+    table_model,
     validate,
 )
 from rov_fmu.vehicle.description import FileHead, Provenance, Validity
@@ -91,7 +91,7 @@ def _coefficients(
         one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
         fields[key] = (one | None, Field(None, description=declaration.description))
     told = [key for key, declaration in declarations.items() if needed and declaration.needed]
-    return table_of(f"_{name}", base, fields, words, told)
+    return table_model(f"_{name}", base, fields, words, told)
 
 
 def given_quantities(table: Strict, declarations: Mapping[str, Declaration]) -> dict[str, Quantity]:
@@ -255,7 +255,7 @@ _tables = {
 _axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.items()}
 
 
-class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
+class Axes(table_model("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
 
 

@@ -22,7 +22,7 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
-from rov_fmu.fmu.variables import FmuModel, Variable
+from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
 from rov_fmu.io.templates import render
 
 _SHOWN = tuple(GAINS)[: tuple(GAINS).index("k_a")]
@@ -53,12 +53,12 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     sensors = [one for one in terminals(layout) if one.name in _PLUGS]
     measured = [name for one in sensors for name in one.variables]
     declared = {**layout.pose, **layout.velocities, **layout.over_ground}
-    made = list[Variable]()
+    made = list[DeclaredVariable]()
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> int:
         given = {"display_unit": declaration.display_unit, **rest}
         about = declaration.description, declaration.unit
-        made.append(Variable(name, len(made), *about, causality, variability, **given))
+        made.append(DeclaredVariable(name, len(made), *about, causality, variability, **given))
         return made[-1].value_reference
 
     def put(name: str, text: str, unit: str, start: float, **rest: Any) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 
-from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.fmus.variable import Value
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import RovError, listed, only, shown
@@ -26,7 +26,7 @@ class Connection(NamedTuple):
 class SystemStructure:
     """The FMUs of a system, and what connects them."""
 
-    parts: dict[str, Part]
+    parts: dict[str, SystemFmu]
     values: dict[str, dict[str, Value]]
     """The start values of each component."""
     connections: list[Connection]
@@ -38,7 +38,7 @@ class MismatchError(RovError, ValueError):
     """Two ends cannot be connected; the message is the reason."""
 
 
-def connected(first: str, second: str, factor: float, parts: Mapping[str, Part]) -> list[Connection]:
+def connected(first: str, second: str, factor: float, parts: Mapping[str, SystemFmu]) -> list[Connection]:
     """Return the connections for a line of a plan: one of two variables, or several of two terminals.
 
     Raises MismatchError.
@@ -75,7 +75,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
     return found
 
 
-def _end(text: str, parts: Mapping[str, Part]) -> tuple[str, str]:
+def _end(text: str, parts: Mapping[str, SystemFmu]) -> tuple[str, str]:
     """Return the component and the variable or terminal of a name in a plan. Raises MismatchError."""
     component, _, name = text.partition(".")
     if component not in parts:
@@ -86,7 +86,7 @@ def _end(text: str, parts: Mapping[str, Part]) -> tuple[str, str]:
     return component, name
 
 
-def checked_connection(one: Connection, parts: Mapping[str, Part]) -> Connection:
+def checked_connection(one: Connection, parts: Mapping[str, SystemFmu]) -> Connection:
     """Return a connection if its ends exist, and causalities, types and units fit. Raises MismatchError."""
     for component, name in (one.start, one.end):
         if component not in parts:

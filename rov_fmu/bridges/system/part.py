@@ -14,7 +14,7 @@ _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "factor", "offset")
 
 
 @dataclass(frozen=True)
-class Part(Fmu):
+class SystemFmu(Fmu):
     """An FMU for Co-Simulation that is a component of a system."""
 
     ports: Mapping[str, Mapping[str, tuple[str, float]]] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Part(Fmu):
     def _bases(self) -> dict[str, Any]:
         return {one.name: one.baseUnit for one in self.description.unitDefinitions}
 
-    def with_ports(self, ports: Mapping[str, Mapping[str, tuple[str, float]]]) -> "Part":
+    def with_ports(self, ports: Mapping[str, Mapping[str, tuple[str, float]]]) -> "SystemFmu":
         """Return the FMU with ports. Raises ValueError with the port and the reason, and FileError."""
         names = {*self.variables, *self.terminals}
         for port, members in ports.items():

@@ -11,7 +11,7 @@ from typing import Any
 from lxml import etree
 
 from rov_fmu.bridges.system.connections import Connection, SystemStructure, checked_connection
-from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.fmus.variable import Value
@@ -128,8 +128,8 @@ def read_ssp(path: Path) -> SystemStructure:
 def _structure(folder: Path, path: Path) -> SystemStructure:
     """Return the system in a folder. Raises FileError, or ValueError with only the reason."""
     root = _root(folder, _STRUCTURE)
-    parts: dict[str, Part] = {}
-    read: dict[str, Part] = {}
+    parts: dict[str, SystemFmu] = {}
+    read: dict[str, SystemFmu] = {}
     values: dict[str, dict[str, Value]] = {}
     sources: dict[str, str] = {}
     for element in root.iterfind("{*}System/{*}Elements/*"):
@@ -141,7 +141,7 @@ def _structure(folder: Path, path: Path) -> SystemStructure:
             raise ValueError(f"{_STRUCTURE}: the name of a component, {shown(name)}, {rule}")
         source = sources[name] = element.get("source", "")
         if source not in read:
-            read[source] = Part.open(Path(f"{path}: {name}"), _file(folder, source).read_bytes())
+            read[source] = SystemFmu.open(Path(f"{path}: {name}"), _file(folder, source).read_bytes())
         part = parts[name] = read[source]
         values[name] = {}
         for binding in element.iterfind("{*}ParameterBindings/{*}ParameterBinding"):
@@ -194,7 +194,7 @@ def _value(parameter: Any) -> Value:
     raise ValueError("must be a finite number, a Boolean or a text")
 
 
-def _connection(one: Any, parts: Mapping[str, Part]) -> Connection:
+def _connection(one: Any, parts: Mapping[str, SystemFmu]) -> Connection:
     """Return a connection. Raises ValueError."""
     keys = "startElement", "startConnector", "endElement", "endConnector"
     start, output, end, name = (one.get(key, "") for key in keys)

@@ -25,7 +25,7 @@ from rov_fmu.bridges.system.connections import (
     halves,
     loop,
 )
-from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, System
 from rov_fmu.build import build_fmu
@@ -89,15 +89,15 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
 
 def _parts(
     plan: SystemPlan, path: Path, served: Served, on_part: Callable[[str], object]
-) -> tuple[dict[str, Part], dict[str, Vehicle]]:
+) -> tuple[dict[str, SystemFmu], dict[str, Vehicle]]:
     """Return the FMUs of a plan, and the vehicles whose FMUs are only described, by the first component of each.
 
     Components of one kind have one FMU. Raises SystemPlanError with every reason, and FileError about a vehicle.
     """
-    parts, vehicles, unread = dict[str, Part](), dict[str, Vehicle](), list[str]()
+    parts, vehicles, unread = dict[str, SystemFmu](), dict[str, Vehicle](), list[str]()
     tables = _tables(plan, path, unread)
     levels = max(map(levels_of, tables.values()), default=0)
-    ready: dict[str, Part] = {}
+    ready: dict[str, SystemFmu] = {}
     for name, table in plan.component.items():
         others = served.get(name, {})
         is_in_waves = bool(_nodes(plan, name)) and any(f"{name}.waves" in line[:2] for line in plan.connect)
@@ -136,19 +136,19 @@ def _parts(
     return parts, vehicles
 
 
-def _check_size(parts: Mapping[str, Part], name: str, path: Path) -> None:
+def _check_size(parts: Mapping[str, SystemFmu], name: str, path: Path) -> None:
     """Raise SystemPlanError, which names the last component, if the FMUs are too large together."""
     if sum(len(part.content) for part in parts.values()) > _MOST_BYTES:
         raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
 
 
-def _part(table: ComponentTable, path: Path, **shape: Any) -> Part:
+def _part(table: ComponentTable, path: Path, **shape: Any) -> SystemFmu:
     """Make a companion of a shape, or read an FMU. Raises FileError."""
     if table.fmu:
         file = inside(path.parent, table.fmu)
-        return Part.open(file)
+        return SystemFmu.open(file)
     assert table.companion
-    return Part.open(Path(table.companion), companion(table.companion, **shape), is_ours=True)
+    return SystemFmu.open(Path(table.companion), companion(table.companion, **shape), is_ours=True)
 
 
 def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
@@ -208,7 +208,7 @@ def _nodes(plan: SystemPlan, component: str) -> int:
     return getattr(_slave(plan, component), "nodes", 0)
 
 
-def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
+def _autopilot(name: str, plan: SystemPlan, path: Path) -> SystemFmu:
     """Make the autopilot of a component's vehicle, for the step of the plan. Raises FileError."""
     held = plan.component[name].held or ""
     table = plan.component.get(held)
@@ -220,7 +220,7 @@ def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
         made = autopilot_of(_vehicle(held, table, path), plan.step)
     except InputError as error:
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', str(error), held)}") from error
-    return Part.open(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
+    return SystemFmu.open(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
 
 
 def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
@@ -234,10 +234,10 @@ def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
     return read_vehicle(file, read_bytes(file, VehicleFileError, most=LARGEST) + points.encode())
 
 
-def _description(vehicle: Vehicle) -> Part:
+def _description(vehicle: Vehicle) -> SystemFmu:
     """Return what the FMU of a vehicle will have, before the compilation takes its time. It cannot run yet."""
     content = archive(native_content(vehicle, interface="cs").files)
-    return Part.open(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
+    return SystemFmu.open(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
 
 
 def _built(vehicle: Vehicle) -> bytes:

@@ -19,7 +19,7 @@ from rov_fmu.bridges.system.companion import levels_of as levels_of_rows
 from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection, SystemStructure
 from rov_fmu.bridges.system.half_step import half_step
-from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
@@ -322,7 +322,7 @@ def test_a_run_writes_the_motion_and_a_plot(tmp_path: Path, capsys: pytest.Captu
 def test_a_plot_has_a_panel_for_each_quantity_and_few_lines_in_it() -> None:
     """Eight lines are two panels, a tension is shown although nothing is connected to it, and levels are left out."""
     parts = {
-        name: Part.open(Path(name), companion(kind), is_ours=True)
+        name: SystemFmu.open(Path(name), companion(kind), is_ours=True)
         for name, kind in {"water": "current", "rope": "tether"}.items()
     }
     start = ("water", "V_N")
@@ -343,7 +343,7 @@ def test_a_plot_has_a_panel_for_each_quantity_and_few_lines_in_it() -> None:
 
 def test_a_stranger_may_number_its_outputs() -> None:
     """Nodes and levels are members of terminals; another output whose name ends like theirs is drawn and compared."""
-    parts = {name: Part.open(Path(name), foreign(output="y_p1")) for name in ("a", "b")}
+    parts = {name: SystemFmu.open(Path(name), foreign(output="y_p1")) for name in ("a", "b")}
     structure = SystemStructure(parts, {}, [Connection(("a", "y_p1"), ("b", "u"))])
     read = recorded_names(structure)
     assert passed(structure) == [("a", "y_p1")]
@@ -366,7 +366,7 @@ def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsy
 
 def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     """All pass on their outputs, then all take a step: z of the second water is V_N of the first, a step before."""
-    part = Part.open(Path("water"), companion("current"), is_ours=True)
+    part = SystemFmu.open(Path("water"), companion("current"), is_ours=True)
     values: dict[str, Value] = {"speed": 1.0, "exponent": 1.0, "seabed": 1.0, "z": 0.5}
     connections = [Connection(("a", "V_N"), ("b", "z"), 0.5)]
     structure = SystemStructure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections)
@@ -434,6 +434,6 @@ def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys:
 
 
 def test_a_run_with_too_many_values_is_refused(tmp_path: Path) -> None:
-    part = Part.open(Path("water"), companion("current"), is_ours=True)
+    part = SystemFmu.open(Path("water"), companion("current"), is_ours=True)
     with pytest.raises(FileError, match="give 300,000,003 values"):
         run_system(SystemStructure({"a": part}, {}, []), tmp_path, [("a", "V_N")] * 3, 1.0, 10**8)

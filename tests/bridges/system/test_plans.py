@@ -11,7 +11,7 @@ from fmpy.ssp.ssd import read_ssd
 from rov_fmu.bridges.system import companion as companions
 from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.connections import MismatchError, SystemStructure, connected, loop
-from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
 from rov_fmu.cli import main
@@ -354,8 +354,8 @@ def with_point() -> Vehicle:
     return read_vehicle(VIDEORAY, VIDEORAY.read_bytes() + point)
 
 
-def parts(**content: bytes) -> dict[str, Part]:
-    return {name: Part.open(Path(name), one, is_ours=True) for name, one in content.items()}
+def parts(**content: bytes) -> dict[str, SystemFmu]:
+    return {name: SystemFmu.open(Path(name), one, is_ours=True) for name, one in content.items()}
 
 
 @pytest.mark.usefixtures("folder")
@@ -408,7 +408,7 @@ def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
 def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     content = companions.companion(name)
     assert companions.companion(name) == content
-    part = Part.open(Path(name), content, is_ours=True)
+    part = SystemFmu.open(Path(name), content, is_ours=True)
     slave = companions.slave_of(name)(instance_name=name)
     assert part.variables.keys() == slave.variables.keys()
     for variable, (causality, start, unit, text) in slave.variables.items():
