@@ -169,7 +169,7 @@ def with_binaries(content: FmuContent, binaries: Mapping[str, bytes], fmi: int) 
 def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> FmuContent:
     """Return the content of the FMU, with its expected results and its pages; in pure Python without platforms."""
     native = platforms is not None
-    results, module = reference_results(vehicle), _module(vehicle)
+    results, module = reference_results(vehicle, native=native), _module(vehicle)
     pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
     if platforms is None:
         return python_content(vehicle, pages)

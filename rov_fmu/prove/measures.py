@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -56,18 +55,6 @@ def holds_if(holds: bool) -> Result:
 
 # ---- Experiments -----------------------------------------------------------------------------------------------------
 
-_SECOND_SOLVER = (
-    " They come from a second solver of the same equation: an explicit Runge-Kutta method of order 8 (DOP853) in "
-    "Python, run when the FMU was built, and not the Taylor series in C that the FMU runs. So they test the "
-    "integration and the compiled code, and not the physics."
-)
-_SAME_LAW = (
-    " They come from the same law in C, compiled for a program that flew the vehicle when the FMU was built. So they "
-    "test the interface and the compiled code, and not the law."
-)
-_ORIGINS = {"equation.h": _SECOND_SOLVER, "autopilot.c": _SAME_LAW}
-"""Where the expected results of an FMU of ours come from, by a file among its sources."""
-
 
 def expected(subject: Subject) -> Evidence:
     """Compare the FMU with the results that it carries."""
@@ -81,8 +68,8 @@ def expected(subject: Subject) -> Evidence:
     count = f"{len(worst)} experiment{'s' * (len(worst) > 1)}"
     words = f"{len(findings) - len(wrong)} of {len(findings)} results of {count} are as expected"
     words += f", within {max(tolerances):.0e} of the largest value of each variable."
-    for name, origin in _ORIGINS.items():
-        words += origin * (subject.is_ours and Path(subject.folder, "sources", name).exists())
+    for told in dict.fromkeys(experiment.told for experiment in subject.experiments if experiment.told):
+        words += f" The FMU says of them: {told.rstrip('.')}."
     if wrong:
         f = wrong[0]
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {in_short(f.deviation)}'}."

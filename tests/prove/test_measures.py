@@ -20,7 +20,7 @@ from rov_fmu.io.csv_table import Series
 from rov_fmu.prove import measures
 from rov_fmu.prove.experiments import Experiment
 from rov_fmu.prove.proof import ProofFinding
-from rov_fmu.prove.runs import Answer, Plan
+from rov_fmu.prove.runs import PlannedRun, Reaction
 from rov_fmu.prove.subject import Subject
 
 _VARIABLES = {"X_ext": "input", "u": "output", "der(u)": "local", **dict.fromkeys(("a_d_u", "F_0_u"), "parameter")}
@@ -65,7 +65,7 @@ def test_the_experiment_with_the_most_held_inputs_is_run() -> None:
     )
     still = replace(_TWO_PIECES, name="still", stimuli=None)
     found = subject(_unasked, still, ramp, _TWO_PIECES)
-    assert found.plan == Plan(0.0, ((1.0, {"X_ext": 1.0}), (2.0, {"X_ext": -1.0})), {"k": "2"}, ["u"])
+    assert found.plan == PlannedRun(0.0, ((1.0, {"X_ext": 1.0}), (2.0, {"X_ext": -1.0})), {"k": "2"}, ["u"])
     assert (found.allowed, found.words) == (1e-3, "the experiment held (2 s)")
     two = Series(time=array("d", (0.0, 1.0, 1.0)), X_ext=array("d", (0.0, 0.0, 1.0)), u=array("d", (0.0, 0.0, 1.0)))
     more = replace(_TWO_PIECES, name="more", stimuli=two, stop=1.0)
@@ -112,7 +112,7 @@ def test_of_each_experiment_the_worst_variable_is_told(
 def _ends(off: Mapping[int, float], end: float = 2.0) -> Callable[..., Any]:
     """Return answers to runs that end at a value, or off it by the number of steps; a run that is not there fails."""
 
-    def call(_: str, plan: Plan, steps: int) -> Any:
+    def call(_: str, plan: PlannedRun, steps: int) -> Any:
         if steps not in off:
             raise RunError("the FMU says no")
         values = np.full((len(plan.pieces) * steps + 1, 1), 99.0)  # the values inside a piece do not count
@@ -168,7 +168,7 @@ def test_steps_that_end_elsewhere_or_are_refused_are_told(
 def test_runs_with_other_bits_are_counted(other: int) -> None:
     asked: list[int] = []
 
-    def call(_: str, __: Plan, steps: int) -> Any:
+    def call(_: str, __: PlannedRun, steps: int) -> Any:
         asked.append(steps)
         return np.full((11, 1), 2.004 if len(asked) in range(50, 50 + other) else 2.0)
 
@@ -181,7 +181,7 @@ def test_runs_with_other_bits_are_counted(other: int) -> None:
 
 
 def test_the_cost_of_a_step_is_its_median_with_most_of_the_steps() -> None:
-    def call(method: str, plan: Plan, steps: int, most: float) -> list[float]:
+    def call(method: str, plan: PlannedRun, steps: int, most: float) -> list[float]:
         assert (method, plan.stop, steps, most) == ("durations", 4.5, 9, 1.0)
         return [*(1e-5 * n for n in range(1, 21)), 1.0]
 
@@ -204,7 +204,7 @@ def test_the_cost_of_a_step_is_its_median_with_most_of_the_steps() -> None:
 def _body(free: float, *braked: float) -> Callable[..., Any]:
     """Return the answers of a body of 2 kg: the energy at the end of a glide without drag, and all those with drag."""
 
-    def call(_: str, plan: Plan, __: int) -> Any:
+    def call(_: str, plan: PlannedRun, __: int) -> Any:
         if [*plan.outputs] == ["der(u)"]:
             return np.full((2, 1), 0.5 * plan.pieces[0][1]["X_ext"] + 0.1)
         assert (plan.stop, plan.parameters["u"], plan.parameters["F_0_u"]) == (10.0, "0.5", "0")
@@ -286,10 +286,10 @@ def test_energy_is_not_measured_where_drag_cannot_be_switched_off() -> None:
 def test_what_is_impossible_is_asked_of_an_fmu(tool: str, refused: int, kept: int, result: str, words: str) -> None:
     asked: list[tuple[str, Any]] = []
 
-    def call(method: str, _: Plan, argument: Any) -> Answer:
+    def call(method: str, _: PlannedRun, argument: Any) -> Reaction:
         asked.append((method, argument))
         tried = len(argument) if method == "values_tried" else 1
-        return Answer(tried, tried, tried, "no") if argument != 0.0 else Answer(1, refused, kept, "well")
+        return Reaction(tried, tried, tried, "no") if argument != 0.0 else Reaction(1, refused, kept, "well")
 
     found = measures.limits(subject(call, generationTool=tool))
     assert repr(asked) == repr(
@@ -310,10 +310,10 @@ def test_what_is_impossible_is_asked_of_an_fmu(tool: str, refused: int, kept: in
 
 
 def test_a_number_without_bounds_has_none_beyond_them() -> None:
-    def call(method: str, _: Plan, argument: Any) -> Answer:
+    def call(method: str, _: PlannedRun, argument: Any) -> Reaction:
         if method == "step_tried":
             raise RunError("cannot be run")
-        return Answer(len(argument), len(argument), len(argument), "no")
+        return Reaction(len(argument), len(argument), len(argument), "no")
 
     found = measures.limits(subject(call, bounds={"F_0_u": {"declaredType": SimpleNamespace(min="-3")}}))
     assert (found.rows[3][1], found.rows[4]) == ("1 of 1", ("A step of 0 s", "0 of 1", "it cannot be run"))

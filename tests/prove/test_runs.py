@@ -7,7 +7,7 @@ import fmpy
 import pytest
 from pythonfmu import FmuBuilder
 
-from rov_fmu.prove.runs import Answer, Plan, Runs
+from rov_fmu.prove.runs import PlannedRun, Reaction, Runs
 from rov_fmu.prove.subject import opened
 from verification.references.fmpy_slave import keep_loaded
 
@@ -72,7 +72,7 @@ def _diary(folder: Path) -> list[str]:
     return lines
 
 
-_PLAN = Plan(1.0, ((2.0, {"u": 3.0, "n": 1.0}), (4.0, {"u": -1.0})), {"k": "2"}, ["y", "n"])
+_PLAN = PlannedRun(1.0, ((2.0, {"u": 3.0, "n": 1.0}), (4.0, {"u": -1.0})), {"k": "2"}, ["y", "n"])
 
 
 def test_a_run_sets_inputs_at_each_piece_and_ends_as_fmi_demands(folder: Path) -> None:
@@ -91,7 +91,9 @@ def test_a_run_sets_inputs_at_each_piece_and_ends_as_fmi_demands(folder: Path) -
 
 def test_both_versions_of_fmi_are_run_alike(videoray_dir: Path, videoray3_dir: Path) -> None:
     two, three = (Runs(str(folder)) for folder in (videoray_dir, videoray3_dir))
-    plan = Plan(0.0, ((1.0, {"u_l": 0.3}), (2.0, {"u_l": -0.5, "Z_ext": 1.0})), {"beta_r": "0.5"}, ["u", "w", "r"])
+    plan = PlannedRun(
+        0.0, ((1.0, {"u_l": 0.3}), (2.0, {"u_l": -0.5, "Z_ext": 1.0})), {"beta_r": "0.5"}, ["u", "w", "r"]
+    )
     assert two.run(plan, 3).tolist() == three.run(plan, 3).tolist()
     for runs in (two, three):
         for length in (-1.0, 2.1):  # the stop time is 2 s
@@ -123,11 +125,11 @@ def test_the_time_of_steps_is_measured_until_it_is_up(folder: Path) -> None:
 
 def test_an_answer_has_the_message_of_the_fmu_and_says_what_stayed(folder: Path) -> None:
     runs = Runs(str(folder))
-    assert runs.step_tried(_PLAN, -1.0) == Answer(1, 1, 1, "discard: never back")
+    assert runs.step_tried(_PLAN, -1.0) == Reaction(1, 1, 1, "discard: never back")
     assert _diary(folder)[-2:] == ["step 1.0 -1.0", "terminate"]
-    assert runs.step_tried(_PLAN, 1.0) == Answer(1, 0, 0, "OK")
+    assert runs.step_tried(_PLAN, 1.0) == Reaction(1, 0, 0, "OK")
     assert _diary(folder)[-2:] == ["step 1.0 1.0", "terminate"]
-    assert runs.values_tried(_PLAN, [("u", 7.0), ("u", 8.0)]) == Answer(2, 0, 0, "OK")
+    assert runs.values_tried(_PLAN, [("u", 7.0), ("u", 8.0)]) == Reaction(2, 0, 0, "OK")
     assert _diary(folder)[-4:] == ["exit", "u = 7.0", "u = 8.0", "terminate"]
-    assert runs.values_tried(_PLAN, [("k", 7.0)]) == Answer(1, 0, 0, "OK")
+    assert runs.values_tried(_PLAN, [("k", 7.0)]) == Reaction(1, 0, 0, "OK")
     assert _diary(folder)[-3:] == ["enter", "u = 3.0", "n = 1"], "parameters are set in the initialization"

@@ -236,7 +236,7 @@ def test_prove_finds_the_expected_results_of_the_autopilot_and_a_gain_that_was_c
         assert "3 of 3 pass" in capsys.readouterr().out
     assert main(["prove", str(path), "--report", str(tmp_path / "proof.html")]) == 0
     page = (tmp_path / "proof.html").read_text(encoding="utf-8")
-    assert "They come from the same law in C" in page
+    assert "they come from the same law in C" in page
     assert "DOP853" not in page
     assert "makes u_l, u_r and u_t anew at each communication step" in page
     made.loops["k_p"][AXES.index(HEAVE)] *= 1.0 + 1e-6
