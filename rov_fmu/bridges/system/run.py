@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
+from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmus.description import TIME_LIMIT, budget
 from rov_fmu.fmus.instance import Array, RunError
@@ -26,8 +27,8 @@ _COLORS = (*LINES, "grey")
 """The colours of the lines of a panel."""
 _QUANTITIES = {"N": "force", "m": "place", "rad": "angle", "m/s": "velocity", "rad/s": "rate"}
 """The words for what a panel shows, by its unit."""
-_NODE, _LEVEL = "_p[0-9]+$", "_[0-9]+$"
-"""The ends of members of terminals: of a tether's at each node, and of a profile's at each level."""
+_NODE, _LEVEL, _PLACE = "_p[0-9]+$", "_[0-9]+$", "^[xyz]$"
+"""Members of terminals: a tether's at each node, a profile's at each level, and the place of a vehicle or an end."""
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
@@ -49,14 +50,14 @@ def recorded_names(structure: SystemStructure) -> list[Name]:
     return [(component, name) for component, part in structure.parts.items() for name in part.numbers("output")]
 
 
-def _members(structure: SystemStructure, end: str) -> set[Name]:
-    """Return the variables that are members of terminals whose names have such an end."""
+def _members(structure: SystemStructure, form: str = "") -> set[Name]:
+    """Return the variables that are members of terminals with such names."""
     return {
         (component, name)
         for component, part in structure.parts.items()
         for members in part.terminals.values()
         for member, name in members.items()
-        if re.search(end, member)
+        if re.search(form, member)
     }
 
 
@@ -126,14 +127,17 @@ def system_csv(read: Sequence[Name], step: float, rows: Array, half: HalfStep | 
 
 
 def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
-    """Return the plot of some variables, or of those that change and pass between the components, and of tensions.
+    """Return the plot of some variables, or of those that change and pass between the components, and of forces that no
+    terminal has, such as the tension of a tether.
 
     Each quantity has a panel: what a component, or one end or point of it, has in one unit.
     """
     columns = {".".join(name): n for n, name in enumerate(read)}
     plain = [name for name in columns if not re.search("_p?[0-9]+$", name)] or columns
     passed = dict.fromkeys([".".join(name) for name in _shown_starts(structure)] or plain)
-    passed |= {name: None for name in columns if ".tension_" in name}
+    parts, members = structure.parts, _members(structure)
+    alone = [name for name in read if name not in members and parts[name[0]].variables[name[1]].unit == "N"]
+    passed |= dict.fromkeys(map(".".join, alone))
     chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
     panels = [*_panels(structure, [read[columns[name]] for name in chosen], is_chosen=bool(names))]
 
@@ -158,19 +162,20 @@ def _panels(
 
     The levels of a profile are left out unless somebody chose the variables: `V_N_3` is beside `V_N`.
     """
-    parts, levels = structure.parts, _members(structure, _LEVEL)
-    of = {name: (parts[name[0]].variables[name[1]].unit, name[0], _end(name[1])) for name in names}
+    parts, levels, places = structure.parts, _members(structure, _LEVEL), _members(structure, _PLACE)
+    of = {name: (parts[name[0]].variables[name[1]].unit, name[0], _end(parts[name[0]], name[1])) for name in names}
     for (unit, component, end), own in grouped((key, name) for name, key in of.items()).items():
         plain = [name for name in own if name not in levels]
         shown = own if is_chosen or not plain else plain
         owner = ", ".join(filter(None, [component, end]))
-        is_place = unit != "m" or own[0][1][0] in "xyz"  # and not the elevation of a sea
-        title = f"{_QUANTITIES[unit]} of {owner}" if unit in _QUANTITIES and is_place else owner
+        is_known = unit in _QUANTITIES and (unit != "m" or own[0] in places)  # the elevation of a sea is no place
+        title = f"{_QUANTITIES[unit]} of {owner}" if is_known else owner
         for some in np.array_split(np.arange(len(shown)), -(-len(shown) // len(_COLORS))):
             yield unit, title, [shown[n] for n in some]
 
 
-def _end(name: str) -> str:
-    """Return the end or the point that a variable is of: `bottom` of F_N_bottom."""
-    match = re.search(r"_([a-z]{2}\w*)$", name)
-    return match[1] if match else ""
+def _end(part: SystemFmu, variable: str) -> str:
+    """Return the end or the point that a variable is of: `bottom` of F_N_bottom, which is the F_N of a terminal."""
+    pairs = [pair for members in part.terminals.values() for pair in members.items()]
+    ends = {name.removeprefix(f"{member}_") for member, name in pairs if name.startswith(f"{member}_")}
+    return next((end for end in ends if variable.endswith(f"_{end}")), "")
