@@ -3,11 +3,12 @@
 import ctypes
 from dataclasses import replace
 from itertools import product
-from math import radians
+from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from rov_fmu.autopilot import flights, law
 from rov_fmu.autopilot.allocation import thrust_rows, voltages
@@ -123,6 +124,18 @@ def test_the_force_between_two_rows_is_that_of_the_curve(path: Path) -> None:
         assert (off < 4e-4 * np.maximum(true, 0.005 * true.max())).all()
 
 
+def test_thrusters_get_whole_steps_of_their_pulses() -> None:
+    """ArduSub sends whole microseconds, and drops what is left of one."""
+    share = Mixer(SIX).sharing
+    modes, aims = np.full((1, 6), STICK), np.array([[0.31, -0.17, 0.23, 0.0, 0.0, 0.05]])
+    whole, fine = (
+        Flights(SIX, one, [{"z": 10.0}]).fly(loops_of({}, 1), modes, aims, 1.0 / RATE).outputs[0]
+        for one in (share, replace(share, steps=0.0))
+    )
+    assert np.abs(fine).max() > 0.0
+    assert whole == pytest.approx(np.floor(share.steps * fine) / share.steps, abs=1e-12)
+
+
 # ---- What it promises ------------------------------------------------------------------------------------------------
 
 
@@ -138,6 +151,23 @@ def test_a_hold_begins_without_a_jump() -> None:
     assert np.abs(after.demands[0, 0] - before.demands[0, -1])[[2, 5]] == pytest.approx([0.0, 0.0], abs=1e-9)
     most = made.loops["most"][[2, 5]]
     assert (np.abs(np.diff(after.demands[0], axis=0))[:, [2, 5]] < 0.2 * most).all()
+
+
+@pytest.mark.parametrize("angle", [0.7, 2.5, -1.6])
+def test_a_hold_does_not_depend_on_where_north_is(angle: float) -> None:
+    """The aim, the heading and the current are turned together."""
+    made = autopilot_of(HEAVY)
+
+    def demands(angle: float) -> NDArray[np.float64]:
+        turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+        current, aim = turn @ [0.2, -0.1], turn @ [1.5, -0.8]
+        start = {"z": 10.0, "u": 0.3, "v": -0.2, "V_N": current[0], "V_E": current[1]}
+        start |= {"eta": cos(0.5 * (0.4 + angle)), "epsilon_3": sin(0.5 * (0.4 + angle))}
+        aims = np.tile([*aim, 10.0, 0.0, 0.0, 0.6 + angle], (100, 1))
+        flight = Flights(HEAVY, made.sharing, [start]).fly(made.loops, np.full((100, 6), PLACE), aims, made.step)
+        return flight.demands[0]
+
+    assert demands(angle) == pytest.approx(demands(0.0), abs=1e-6)
 
 
 @pytest.mark.parametrize(("roll", "pitch"), [(0.0, 1.3), (0.0, -1.3), (2.0, 0.4)])
