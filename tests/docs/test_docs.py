@@ -27,7 +27,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
 from tests.docs.test_notebooks import NOTEBOOKS
 from tests.often import spread
-from tests.vehicles import VEHICLES
+from tests.vehicles import SIX, VEHICLES, tied
 
 State = dict[str, float]
 
@@ -326,6 +326,18 @@ def test_every_variable_is_told(kind: str) -> None:
         told |= {f"{pattern}{name}" for name in known[of]}
     names = {*layout.inputs, *layout.state, *layout.calculated, *layout.coefficients}
     assert {name.removesuffix("_reverse") for name in names} <= told
+
+
+def test_the_page_tells_which_parameters_are_tunable() -> None:
+    page = (ROOT / "docs" / "variables.md").read_text(encoding="utf-8")
+    told = dict[str, bool]()
+    for names, what in re.findall(r"^\| (`[^|]+) \| ([^|]+) \|", page.partition("| parameter |")[2], re.MULTILINE):
+        for name in re.findall(r"`([^`]+)`", names):
+            told[re.sub("<.*>", ".+", name)] = "; tunable" in what or (name[:3] == "k_t" and "(tunable)" in what)
+    for rov in (*VEHICLES.values(), tied(SIX, hook=(0.1, 0.2, 0.3))):
+        for name, declared in rov.layout.coefficients.items():
+            told_of = {is_tunable for pattern, is_tunable in told.items() if re.fullmatch(pattern, name)}
+            assert told_of in ({declared.tunable}, set()), name
 
 
 def test_tables_that_follow_from_the_code_are_as_it_has_them() -> None:
