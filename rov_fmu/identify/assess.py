@@ -20,9 +20,9 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5, 1.0, -1.0)
 """The commands of the answers. The strongest tested ones are added."""
-_EXPONENT = 0.15
-"""The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
-of the command and the velocity that are known to about a tenth each."""
+_EXPONENT = 0.1
+"""The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust grows with a power of the
+command that is known to about a tenth. The power of drag is a parameter of its own."""
 _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
 ROCKING = CONSTANTS["rocking"].value

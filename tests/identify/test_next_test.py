@@ -108,9 +108,9 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
 
 
 def test_a_stronger_command_removes_what_is_allowed_beyond_the_tests(fit: Fit) -> None:
-    """Dives up to 25 % leave the speed at 50 % uncertain by 0.15 ln 2, which a test of 60 % does not."""
+    """Dives up to 25 % leave the speed at 50 % uncertain by 0.1 ln 2, which a test of 60 % does not."""
     posterior = replace(fit.posterior, z=fit.file.posterior.z)
-    test, allowed = proposed(fit), QUANTILE * 0.15 * np.log(2.0)
+    test, allowed = proposed(fit), QUANTILE * 0.1 * np.log(2.0)
     assert test
     half = float(np.hypot(test.now, allowed))
     answer = Answer(
@@ -123,4 +123,4 @@ def test_a_stronger_command_removes_what_is_allowed_beyond_the_tests(fit: Fit) -
     assert wider.now == pytest.approx(half)
     assert max(abs(command) for command, _ in plan(wider)) >= 0.6
     assert wider.then == pytest.approx(test.then, rel=0.3)
-    assert weaker.then > QUANTILE * 0.15 * np.log(0.5 / 0.4)
+    assert weaker.then > QUANTILE * 0.1 * np.log(0.5 / 0.4)

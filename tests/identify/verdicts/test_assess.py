@@ -49,7 +49,7 @@ def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_te
     assert half.steady[1][1] / half.steady[0] == pytest.approx(np.exp(0.03)), "it may have rocked unseen"
     assert half.rise[1] == pytest.approx((half.rise[0], half.rise[0]))
     for value, (_, high) in (full.steady, full.rise, full.stop):
-        assert np.log(high / value) == pytest.approx(t.ppf(0.975, 10) * 0.15 * np.log(2.0))
+        assert np.log(high / value) == pytest.approx(t.ppf(0.975, 10) * 0.1 * np.log(2.0))
     assert answers_of_file(losing, SURGE)[2].stop[0] == pytest.approx(half.stop[0])
 
 
