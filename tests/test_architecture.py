@@ -55,7 +55,14 @@ MAY_IMPORT = {
     },
     "tests/verification": {"tests", "tests/verification", "verification", "examples", "rov_fmu"},
     "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", REFERENCES},
-    "tests": {"tests", REFERENCES, "verification/fresh_environment", "verification/tables", "rov_fmu"},
+    "tests": {
+        "tests",
+        REFERENCES,
+        "verification/fresh_environment",
+        "verification/identification/strangers",
+        "verification/tables",
+        "rov_fmu",
+    },
 }
 """Which folders of this repository each folder may import. The innermost folder counts."""
 

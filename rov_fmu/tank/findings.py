@@ -156,7 +156,8 @@ _FACTS = {
         "{files}: nothing is logged for {gaps}, so the commands are unknown there. What follows counts as another log"
     ),
     "rests": (
-        "{files}: {left} s are left out, {rests}: what rests against something does not move by its thrust and drag"
+        "{files}: {left} s are left out, {rests}: there, a push that moves it elsewhere hardly does, as if it rested "
+        "against something"
     ),
     "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",
     "source of commands": "{files}: the commands of the thrusters are those of {source}{others}",

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.arrays import Array
@@ -25,6 +26,8 @@ _TOGETHER = 2.0
 """Sensors froze together if they froze within this time, s."""
 _LEAST_JUMP = 0.2
 """The smallest jump, m, rad or m/s."""
+_ANOTHER = ". What follows counts as another log"
+"""The end of the sentence about jumps that divide a log."""
 _FASTER = 5.0
 """A quantity jumps where it changes this many times as fast as around there, by this many usual steps, and stays there:
 its median over three samples changes by half of the jump or more."""
@@ -91,7 +94,8 @@ def _others(channel: Channel, channels: Sequence[Channel]) -> str:
 
 
 def uninterrupted(log: Log) -> list[Log]:
-    """Return the pieces of a log with commands between the gaps in which it tells neither these nor a measurement.
+    """Return the pieces of a log with commands between the gaps in which it tells neither these nor a measurement, and
+    between resets of its depth or of an angle, which no motion explains.
 
     What was commanded in a gap is unknown. If the last command held there, the motion after it would contradict it.
     """
@@ -100,14 +104,19 @@ def uninterrupted(log: Log) -> list[Log]:
     told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
     silent = gaps(told, told)
     interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))
-    return without_spans(log, silent, interruption) if silent else [log]
+    resets = {pair for channel in log.channels if _divides(channel) for pair in _resets(channel)}
+    return without_spans(log, sorted({*silent, *resets}), [interruption] if silent else [])
 
 
-def without_spans(log: Log, spans: Sequence[tuple[float, float]], why: Finding, least: float = 0.0) -> list[Log]:
-    """Return the pieces of a log with commands beside some spans of time (s, ascending), the first one with a finding
-    that says why. Pieces that are not longer than `least`, s, are left out."""
+def without_spans(
+    log: Log, spans: Sequence[tuple[float, float]], why: Sequence[Finding], least: float = 0.0
+) -> list[Log]:
+    """Return the pieces of a log with commands beside some spans of time (s, ascending), the first one with findings
+    that say why. Pieces that are not longer than `least`, s, are left out."""
     commands = log.commands
     assert commands
+    if not spans:
+        return [log]
     first = min(float(commands.rows[0]), *(float(c.time[0]) for c in log.channels if len(c.time)))
     pieces = list[Log]()
     edges = [-np.inf, *(edge for span in spans for edge in span), np.inf]
@@ -124,7 +133,7 @@ def without_spans(log: Log, spans: Sequence[tuple[float, float]], why: Finding, 
                 file=f"{log.file} (from {start - first:.4g} s)" if start > -np.inf else log.file,
                 commands=Commands.of_rows(commands.thrusters, rows, commands.at(rows), commands.source),
                 channels=tuple(channels),
-                findings=() if pieces else (*log.findings, why),
+                findings=() if pieces else (*log.findings, *why),
             )
             pieces.append(piece)
     return pieces
@@ -135,18 +144,32 @@ def gaps_in_words(found: Sequence[tuple[float, float]], begin: float) -> str:
     return ", ".join(first_of([f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in found], MOST))
 
 
+def _resets(channel: Channel) -> list[tuple[float, float]]:
+    """Return the times before and after each jump of a position, s."""
+    if channel.unused or channel.quantity.unit not in ("m", "rad"):
+        return []
+    time, values = channel.unwrapped
+    return [(float(time[n]), float(time[n + 1])) for n in jumps(time, values)]
+
+
+def _divides(channel: Channel) -> bool:
+    """Return True for a depth or an angle, whose resets divide a log. Those of other positions may come often."""
+    axis = channel.quantity.axis
+    return axis is not None and (axis is HEAVE or axis.is_rotation)
+
+
 def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
-    axis, unit = channel.quantity.axis, channel.quantity.unit
-    time, values = channel.unwrapped
-    if unit not in ("m", "rad") or not len(indices := jumps(time, values)):
+    if not (resets := _resets(channel)):
         return None
-    factor, shown_unit = in_degrees(unit)
-    steps = factor * np.diff(values)
-    told = [f"{steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in indices]
+    axis, (factor, unit) = channel.quantity.axis, in_degrees(channel.quantity.unit)
+    steps = factor * np.diff(np.interp(resets, *channel.unwrapped)).ravel()
+    told = [
+        f"{step:+.3g} {unit} at {end - channel.time[0]:.4g} s" for step, (_, end) in zip(steps, resets, strict=True)
+    ]
+    words = ", ".join(first_of(told, MOST)) + _ANOTHER * _divides(channel)
     name = axis.name if axis else ""
-    words = ", ".join(first_of(told, MOST))
-    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(indices))
+    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(resets))
 
 
 def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[np.intp]:

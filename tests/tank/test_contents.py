@@ -12,11 +12,11 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
-from rov_fmu.tank.quality import checked_log, jumps
+from rov_fmu.tank.quality import checked_log, jumps, uninterrupted
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import rows_of
-from tests.tank.logs import channel, commanded, commands, log, measured
+from tests.tank.logs import channel, commanded, commands, log, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, TIME
 from tests.tank.readers.writers import table
@@ -153,7 +153,18 @@ def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
     found = checked_log(
         log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values))
     )
-    assert sentences(found.findings) == ((f"a.csv: {told}",) if told else ())
+    assert sentences(found.findings) == ((f"a.csv: {told}. What follows counts as another log",) if told else ())
+
+
+def test_a_log_is_divided_where_its_depth_is_reset() -> None:
+    """The sample before a jump belongs to the piece before it. Other positions, which jump often, divide nothing."""
+    jumped = motion.DEPTH + 1.5 * (TIME > 4.95)
+    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
+    first, second = uninterrupted(log(down, channel("depth", TIME, jumped)))
+    assert np.array_equal(np.concatenate([used(one, "depth").time for one in (first, second)]), TIME)
+    assert used(second, "depth").time[0] == pytest.approx(5.0)
+    along = log(down, channel("surge distance", TIME, jumped))
+    assert uninterrupted(along) == [along]
 
 
 @pytest.mark.parametrize(("jump", "at"), [(0.8, [160]), (-0.8, [160]), (0.0, [])])

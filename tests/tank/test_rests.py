@@ -1,6 +1,6 @@
 """What rests against something is left out before a fit, and nothing of a dive in which nothing does.
 
-The dives are drawn here by an equation of their own: thrust c|c|, drag, a load, and a floor, a deck or a hand.
+The dives are drawn here by an equation of their own: thrust c|c|, drag, a load, and a floor, a wall, a deck or a hand.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.identify.scenarios.catalogue import USUAL
 from tests.identify.scenarios.tank import Logs, Tank
 from tests.tank.logs import channel, commands, log, used
+from verification.references.pool import Conditions
 
 LAYOUT = load_vehicle(SHIPPED["bluerov2"]).layout
 STEP = 0.02
@@ -50,13 +51,16 @@ def drawn(
     *,
     start: float = 3.0,
     load: float = -2.0,
-    zeroed: bool = False,
+    zeroed: float | None = None,
 ) -> Log:
-    """Return a log of 110 s at 10 Hz; `command` may replace what is commanded and `limit` the motion."""
+    """Return a log of 110 s at 10 Hz; `command` may replace what is commanded and `limit` the motion.
+
+    `zeroed` is the depth at which a sensor was switched on that takes all above for the surface.
+    """
     random = np.random.default_rng(seed)
     starts = np.cumsum(random.uniform(2.5, 5.0, 60))
     plans = random.choice([-0.4, -0.3, -0.2, 0.0, 0.2, 0.3, 0.4], (60, 2))
-    s, zero, rows = State(start), 0.0, list[tuple[float, ...]]()
+    s, zero, rows = State(start), zeroed or 0.0, list[tuple[float, ...]]()
     for n in range(int(110.0 / STEP)):
         t = n * STEP
         if n % 5 == 0:
@@ -64,7 +68,7 @@ def drawn(
             s.down = -0.35 if s.z > 9.0 and s.down > -0.1 else 0.4 if s.z < 1.5 and s.down < 0.2 else s.down
             command(t, s)
             depth = s.z + random.normal(0.0, 0.005)
-            zero = min(zero, depth) if zeroed else 0.0  # a sensor that takes all above it for the surface
+            zero = zero if zeroed is None else min(zero, depth)
             rows.append((t, s.down, s.ahead, depth - zero, s.u + random.normal(0.0, 0.01)))
         share = float(np.clip(1.0 + s.z / 0.25, 0.0, 1.0))  # of the vehicle in the water
         force = 110.0 * s.down * abs(s.down) + load - 40.0 * s.w * abs(s.w) - 6.0 * s.w
@@ -126,6 +130,19 @@ def hand(rate: float) -> Change:
     return limit
 
 
+def wall(t: float, s: State) -> None:
+    s.u = min(s.u, 0.0) if 44.0 < t < 54.0 else s.u
+
+
+def drives_on(t: float, s: State) -> None:
+    s.ahead = 0.35 if 20.0 < t < 26.0 or 40.0 < t < 52.0 or 64.0 < t < 70.0 else -0.3 if 52.0 <= t < 56.0 else s.ahead
+
+
+def rises_beyond(t: float, s: State) -> None:
+    """To above the depth of 4 m at which it began."""
+    s.down = 0.35 if t < 6.0 or 18.0 < t < 26.0 else -0.3 if t < 18.0 else s.down
+
+
 def off_at_the_ends(t: float, s: State) -> None:
     """Thrusters that are off until 8 s and from 95 s on leave a neutral vehicle where it is."""
     s.w *= float(8.0 < t < 95.0)
@@ -143,13 +160,15 @@ def pushes_on(t: float, s: State) -> None:
     ("dive", "within", "at_least"),
     [
         (drawn(1, floats, start=0.05), [(0.0, 12.0), (82.0, 110.0)], [(0.0, 9.0), (97.0, 110.0)]),
-        (drawn(2, floats, start=0.6, zeroed=True), [(0.0, 12.0), (82.0, 110.0)], [(3.0, 8.0), (97.0, 110.0)]),
+        (drawn(2, floats, start=0.6, zeroed=0.0), [(0.0, 12.0), (82.0, 110.0)], [(3.0, 8.0), (97.0, 110.0)]),
         (drawn(3, pushes_down, dives_to(7.0)), [(0.0, 110.0)], [(54.0, 61.0)]),
         (drawn(4, ends_below, dives_to(7.0)), [(0.0, 110.0)], [(102.0, 109.0)]),
         (drawn(4, holds_depth, dives_to(6.5)), [(44.0, 78.0)], [(50.0, 74.0)]),
         (drawn(5, waits, on_deck, start=-1.2), [(0.0, 24.5)], [(0.0, 23.5)]),
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
+        (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
+        (drawn(10, rises_beyond, start=4.0, zeroed=4.0), [(0.0, 110.0)], [(14.0, 17.5)]),
     ],
     ids=[
         "surface",
@@ -160,6 +179,8 @@ def pushes_on(t: float, s: State) -> None:
         "deck",
         "hand",
         "pulled up",
+        "wall",
+        "depth set to zero again",
     ],
 )
 def test_a_rest_is_left_out_with_one_finding(
@@ -188,9 +209,14 @@ def test_thrusters_that_are_off_at_the_ends_of_a_log_are_no_rest() -> None:
         assert without_rests(dive, LAYOUT) == [dive]
 
 
-def test_a_dive_from_depth_0_in_a_tank_without_a_surface_is_left_as_it_is(tmp_path: Path) -> None:
-    for seed in range(3):
-        Tank("videoray", Logs("pilot", count=2, seconds=20.0), USUAL).write(seed, tmp_path / str(seed))
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.2, 0.1)])
+def test_neither_depth_0_in_a_tank_without_a_surface_nor_a_current_is_a_rest(
+    current: tuple[float, float], tmp_path: Path
+) -> None:
+    """A current stops a vehicle by its heading."""
+    for seed in range(2):
+        tank = Tank("videoray", Logs("pilot", count=2, seconds=20.0), USUAL, conditions=Conditions(current=current))
+        tank.write(seed, tmp_path / str(seed))
         assert not [one for one in read_folder(tmp_path / str(seed)).findings if one.kind == "rests"]
 
 
