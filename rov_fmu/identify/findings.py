@@ -401,16 +401,20 @@ def _cure(identification: Identification) -> str:
 def _with_cure(identification: Identification) -> tuple[AxisResult, ...]:
     """Return the results of the axes, with one thing to do where an unlogged motion turns the vehicle.
 
-    It bends the thrust curves of yaw, and so each axis that shares them. Mistakes in its logs are another cause.
+    It bends the thrust curves of yaw, and so each axis that shares them. Mistakes in its logs, and an unknown force or
+    velocity along it, are other causes.
     """
-    cure, layout = _cure(identification), identification.vehicle.layout
-    curves = {
-        one.axis: {thruster.curve for thruster in layout.thrusters_along(one.axis)} for one in identification.axes
-    }
+    if not (cure := _cure(identification)):
+        return identification.axes
+    layout = identification.vehicle.layout
+    bent = {thruster.curve for thruster in layout.thrusters_along(YAW)}
+
+    def is_bent(one: AxisResult) -> bool:
+        is_other = one.slips or one.misfits or any(not d.changes_thrust for d in one.unknown)
+        return one.axis is YAW or not (is_other or bent.isdisjoint(t.curve for t in layout.thrusters_along(one.axis)))
+
     return tuple(
-        replace(one, verdict=replace(one.verdict, remedy=cure))
-        if cure and one.verdict.word != "good" and curves[one.axis] & curves[YAW] and not (one.slips or one.misfits)
-        else one
+        replace(one, verdict=replace(one.verdict, remedy=cure)) if one.verdict.word != "good" and is_bent(one) else one
         for one in identification.axes
     )
 

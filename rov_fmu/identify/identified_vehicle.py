@@ -31,7 +31,7 @@ from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.description import DRAFTED, ROV_FILE
 from rov_fmu.vehicle.checks import check_surface
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNDETERMINED, UNTUNED, Basis, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
@@ -88,7 +88,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Ident
         if name in identified:
             sources[name] = _SOURCE
         elif name not in {*names, *unseen}:
-            sources[name] = "Assumed: the tests do not determine it"
+            sources[name] = UNDETERMINED
         elif not isclose(rov[name], tests.base.get(name, inf), rel_tol=_UNCHANGED):
             sources[name] += "; adapted to the tests"
     if names:
@@ -344,10 +344,11 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
 
 
 def _data(fit: Fit) -> str:
-    """Return what the vehicle was identified from, in words."""
-    dives = sum(not one.log.follows_axis for one in fit.objective.logs)
+    """Return what the vehicle was identified from, in words. The pieces of a dive between rests are one log."""
+    logs = [one.log for one in fit.objective.logs]
+    dives = len({log.whole_file for log in logs if not log.follows_axis})
     parts = ["a dive log" if dives == 1 else f"{dives} dive logs"] if dives else []
-    if fit.objective.rows or dives < len(fit.objective.logs):
+    if fit.objective.rows or any(log.follows_axis for log in logs):
         parts.insert(0, "tank tests")
     return " and ".join(parts) or "given values"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rov_fmu.autopilot.gains import unknown_lags
 from rov_fmu.bridges.allocation import allocation_files
 from rov_fmu.bridges.mujoco import mujoco_files, mujoco_texts
 from rov_fmu.bridges.sdf import gazebo_model
@@ -132,9 +133,10 @@ def _contents(
 
             named = path / f"{vehicle.identifier}_autopilot.fmu"
             words = f"connect {named} with the FMU of the vehicle: pose, velocities and thrusters (docs/system.md)"
-            return autopilot_files(vehicle), Exported({}, following=words)
+            notes = [*unknown_lags(vehicle)]
+            return autopilot_files(vehicle), Exported({}, "Note", notes, following=words)
         case "gains":
             from rov_fmu.bridges.autopilot.files import gains_yaml
 
-            return gains_yaml(vehicle), Exported({})
+            return gains_yaml(vehicle), Exported({}, "Note", [*unknown_lags(vehicle)])
     return allocation_files(vehicle), Exported({})

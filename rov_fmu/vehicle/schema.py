@@ -66,6 +66,8 @@ UNTUNED = 1.0
 """The value of α and β, and of the health of a thruster, where the file does not give them."""
 NOT_GIVEN = "not given"
 """Their source there."""
+UNDETERMINED = "Assumed: the tests do not determine it"
+"""The source of a coefficient that an identification needs, and that no test tells."""
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
 _NONE: Mapping[str, Any] = MappingProxyType({})

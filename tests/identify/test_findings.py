@@ -128,13 +128,14 @@ def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
     bad = replace(moving.axes[0], verdict=Verdict("do not use", ()))
     again = Verdict("usable", ("The thrust changes slowly.",), "Log it again.")
     heave, ahead, sway = (replace(bad, axis=axis, verdict=again) for axis in (HEAVE, SURGE, SWAY))
-    sway, heave = replace(sway, slips=SLIPS[:1]), replace(heave, verdict=replace(again, word="good"))
+    pulled = disturbance("slow force").disturbances
+    sway, heave = replace(sway, slips=SLIPS[:1]), replace(heave, disturbances=pulled)
     all_axes = replace(moving, axes=(bad, ahead, sway, heave))
     (first, *_) = repairs(all_axes)
     cure = "Turn on the spot in a log of its own, and leave yaw out of dive.csv by [leave_out] in rov.toml."
     assert first == f"{cure} Then identify again."
     remedies = [one.verdict.remedy for one in told(all_axes).axes]
-    assert remedies == [cure, cure, "Log it again.", "Log it again."]  # a slip, and a good axis, have their own
+    assert remedies == [cure, cure, "Log it again.", "Log it again."]  # a slip, and an unknown force, are other causes
     assert "turn on the spot in a log of its own, and leave yaw out of dive.csv" in asked
     assert said(turning_alone, "unlogged motion") == []
     spot = replace(turning_alone.folder.logs[0], file="spot.csv (from 41 s)")

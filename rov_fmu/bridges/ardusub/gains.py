@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.autopilot.ardusub import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
+from rov_fmu.autopilot.gains import unknown_lags
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
 from rov_fmu.io.reading import read_text
@@ -139,6 +140,7 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
             if shares[axis] < _LEAST:
                 why[axis] = f"with {_LEAST:.0%} of the rule's gains, {words}"
     if not given:
+        notes += unknown_lags(vehicle)
         notes += [f"{axis.name}: left out, so that it keeps its gains: {words}" for axis, words in why.items() if words]
     notes += [
         f"{axis.name}: the gains are {share:.0%} of the rule's, so that nothing chatters and all is stable"
