@@ -74,7 +74,8 @@ which gives it almost a third of its full speed. A symmetric pair leaves less, i
 _LEAST_WANDER = 0.005
 """A wander of an estimator's velocity below this one is not told, m/s."""
 _ODD = 3.0
-"""A log disagrees with the others if its unknown force is so many times the largest one of the others."""
+"""A log disagrees with the others if its unknown force, or the error of a prediction, is so many times the largest one
+of the others."""
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
 _SURE = 0.99
@@ -423,8 +424,9 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     """Yield each log that does not fit the others, with the reason as a sentence: a probable slip, motion that the
     others predict worse than no change, or a slow force that is much larger than in the others.
 
-    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one. Nor is one
-    whose unknown torque an unlogged motion explains.
+    Where half of the logs are predicted worse than no change, or others about as badly, the model is wrong, and no log
+    is the odd one: one that hardly moves is easily predicted worse than no change. Nor is one whose unknown torque an
+    unlogged motion explains.
     """
     explained = {YAW} if any(_on_unlogged_motion(identification)) else {*()}
     slipped = {(slip.file, slip.quantity) for slip in identification.slips}
@@ -434,7 +436,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         judged = [p for p in result.predictions if p.is_judged]
         for p in judged:
             own = [other for other in judged if other.quantity == p.quantity]
-            is_odd = 2 * sum(other.is_worse for other in own) < len(own)
+            most = max((other.error for other in own if other.file != p.file), default=0.0)
+            is_odd = 2 * sum(other.is_worse for other in own) < len(own) and p.error > _ODD * most
             if p.is_worse and is_odd and (p.file, p.quantity) not in slipped:
                 error, unchanged = _errors(p)
                 yield (
