@@ -129,6 +129,12 @@ def _apart(e: AxisResult) -> str:
     return f"{capitalized(words)}." if e.mixed else ""
 
 
+def _again(e: AxisResult) -> str:
+    """Return how to see whether the largest unknown disturbance belongs to its log alone."""
+    voltage = ", with the voltage" if max(e.unknown, key=lambda d: d.share).changes_thrust else ""
+    return f"Log it again{voltage}. If that log is good, leave the axis out of this one by [leave_out] in rov.toml."
+
+
 def _faster(e: AxisResult) -> str:
     """Return how to see what is fast."""
     rate = max((p.rate for p in e.predictions), default=0.0)
@@ -209,7 +215,7 @@ RULES = (
         MOST_UNKNOWN,
         "{what} in {file}.",
         _largest,
-        remedy="Log it again. If that log is good, leave the axis out of this one by [leave_out] in rov.toml.",
+        remedy=_again,
     ),
     Rule(
         "no answers",

@@ -20,7 +20,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total_information
 from rov_fmu.identify.result import KEPT
 from rov_fmu.identify.unexplained.causes import _evidence, _Piece, cause_of, independent
-from rov_fmu.identify.unexplained.disturbances import disturbances, followed
+from rov_fmu.identify.unexplained.disturbances import acting_since, disturbances, followed
 from rov_fmu.tank.arrays import Array
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN, TRUTH
@@ -150,6 +150,18 @@ def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
     assert {p.kind for p in slow} == {*SLOW}
     assert len({*indices}) == len(indices) == 3 + 1 + 3
     assert not own.indices_of("force", "sway")
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "since"),
+    [(13.7, 60.0, 13.7), (0.0, 60.0, 0.0), (60.0, 60.0, None), (20.0, 40.0, None)],
+    ids=["a load taken at 13.7 s", "always", "never", "it comes and goes"],
+)
+def test_a_disturbance_acts_from_when_it_stays(start: float, end: float, since: float | None) -> None:
+    """A path also exceeds twice its uncertainty, or falls below it, by chance: here for 0.3 s in each 4 s."""
+    time = np.arange(600) / 10.0
+    by_chance = (time % 4.0 < 0.3) & (time > 2.0)
+    assert acting_since(time, ((time >= start) & (time < end)) ^ by_chance) == since
 
 
 @pytest.mark.long

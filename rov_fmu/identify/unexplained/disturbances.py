@@ -16,10 +16,12 @@ from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.io.groups import grouped
-from rov_fmu.tank.arrays import Array, rms
+from rov_fmu.tank.arrays import Array, Flags, rms
 
 _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
+_PARTED = 0.9
+"""A slow process acts from some time on if at least this share of the samples shows nothing before, and it after."""
 _STEPS = 8
 """The most derivatives of a fit without a slow process."""
 
@@ -116,7 +118,7 @@ def _disturbance(
         ]
         usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
     size = float(np.sqrt(np.mean(np.sum(acting**2, axis=1))))
-    clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
+    clear = np.any(np.abs(states) > 2.0 * deviations, axis=1)
     return Disturbance(
         parameter.kind,
         parameter.of,
@@ -128,5 +130,16 @@ def _disturbance(
         axis=axis,
         file=sampled.file,
         share=size / usual,
-        since=float(time[clear[0]] - time[0]) if len(clear) else None,
+        since=acting_since(time, clear),
     )
+
+
+def acting_since(time: Array, clear: Flags) -> float | None:
+    """Return from when on a slow process acts, s after the first of n samples; None if it comes and goes.
+
+    `clear` is true where it exceeds twice its own uncertainty, which it does now and then by chance. So the time counts
+    that parts the samples best into those without it and those with it.
+    """
+    right = np.append(0, np.cumsum(~clear)) + np.append(np.cumsum(clear[::-1])[::-1], 0)
+    first = int(np.argmax(right))
+    return float(time[first] - time[0]) if first < len(time) and right[first] >= _PARTED * len(time) else None
