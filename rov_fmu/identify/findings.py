@@ -396,7 +396,7 @@ def _cure(identification: Identification) -> str:
     is none, or if no axis is spoilt by it."""
     if all(result.verdict.word != "do not use" for result in identification.axes):
         return ""
-    return "".join(f"{capitalized(one.words['apart'])}." for one in _on_unlogged_motion(identification))
+    return "".join(f"{capitalized(str(one.words['apart']))}." for one in _on_unlogged_motion(identification))
 
 
 def _with_cure(identification: Identification) -> tuple[AxisResult, ...]:
@@ -424,9 +424,9 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     """Yield each log that does not fit the others, with the reason as a sentence: a probable slip, motion that the
     others predict worse than no change, or a slow force that is much larger than in the others.
 
-    Where half of the logs are predicted worse than no change, or others about as badly, the model is wrong, and no log
-    is the odd one: one that hardly moves is easily predicted worse than no change. Nor is one whose unknown torque an
-    unlogged motion explains.
+    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one. Nor is one
+    that is predicted about as badly as others, or that hardly moves, so that no change is easily a better prediction:
+    its error has to exceed the motion of the others. Nor one whose unknown torque an unlogged motion explains.
     """
     explained = {YAW} if any(_on_unlogged_motion(identification)) else {*()}
     slipped = {(slip.file, slip.quantity) for slip in identification.slips}
@@ -436,8 +436,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         judged = [p for p in result.predictions if p.is_judged]
         for p in judged:
             own = [other for other in judged if other.quantity == p.quantity]
-            most = max((other.error for other in own if other.file != p.file), default=0.0)
-            is_odd = 2 * sum(other.is_worse for other in own) < len(own) and p.error > _ODD * most
+            beyond = [max(_ODD * other.error, other.unchanged) for other in own if other.file != p.file]
+            is_odd = 2 * sum(other.is_worse for other in own) < len(own) and p.error > max(beyond, default=0.0)
             if p.is_worse and is_odd and (p.file, p.quantity) not in slipped:
                 error, unchanged = _errors(p)
                 yield (

@@ -129,6 +129,11 @@ def _apart(e: AxisResult) -> str:
     return f"{capitalized(words)}." if e.mixed else ""
 
 
+def _unless_alone(words: str) -> Callable[[AxisResult], str]:
+    """Return what to do where the axis has no log of its own; where it has one, that alone should count."""
+    return lambda e: _apart(e) if e.alone else words
+
+
 def _again(e: AxisResult) -> str:
     """Return how to see whether the largest unknown disturbance belongs to its log alone."""
     voltage = ", with the voltage" if max(e.unknown, key=lambda d: d.share).changes_thrust else ""
@@ -170,7 +175,7 @@ RULES = (
         "The predictions {reach}.",
         _reach,
         is_least=True,
-        remedy="Log this axis alone, both ways, each command for 8 s.",
+        remedy=_unless_alone("Log this axis alone, both ways, each command for 8 s."),
     ),
     Rule(
         "moving quantities for which no change is a better prediction",
@@ -179,7 +184,9 @@ RULES = (
         0.5,
         "A prediction of no change is better for the {quantity} in {file}.",
         lambda e: {"quantity": e.worse[0].quantity, "file": e.worse[0].file},
-        remedy="Check signs and units with `rov-fmu inspect`; if they are right, log this axis alone, both ways.",
+        remedy=_unless_alone(
+            "Check signs and units with `rov-fmu inspect`; if they are right, log this axis alone, both ways."
+        ),
     ),
     Rule(
         "nothing predicted that moves",

@@ -90,6 +90,10 @@ def test_what_was_done_already_is_not_asked_for_again() -> None:
         f"L{leave}, because it is alone in c.csv.",
         "Log at 20 Hz or more, with steps of the command from rest.",
     ]
+    for badly in (tuple(scored(0.2)), (WORSE,)):
+        first, then = (verdict(replace(one, predictions=badly, structure=0.0, soon=0.0)) for one in (doubtful, alone))
+        assert "og this axis alone, both ways" in first.remedy
+        assert then.remedy == f"L{leave}, because it is alone in c.csv."
     done = verdict(replace(apart, predictions=frequent))
     assert (done.word, done.remedy) == ("usable", "")
 
