@@ -30,17 +30,6 @@ def _member(name: str, content: bytes = b"", mode: int = 0, method: int = zipfil
     return add
 
 
-def _zeros(megabytes: int) -> Callable[..., None]:
-    def add(archive: zipfile.ZipFile) -> None:
-        entry = zipfile.ZipInfo("resources/zeros.bin")
-        entry.compress_type = zipfile.ZIP_DEFLATED
-        with archive.open(entry, "w") as file:
-            for _ in range(megabytes):
-                file.write(bytes(1_000_000))
-
-    return add
-
-
 _PATH = "must be a relative path with forward slashes, whose parts are names on every system"
 BAD: dict[str, tuple[Callable[..., None], str]] = {
     "a path upwards": (_member("resources/../../evil"), f"member 'resources/../../evil': {_PATH}"),
@@ -72,7 +61,6 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
         for character in "\x7f\x85\xa0\xad\u061c\u200b\u200d\u200f\u2028\u202e\u2066\ufeff\u3164\ufe0f\U000e0020"
     },
     "a blank at the end": (_member("resources/x "), f"member 'resources/x ': {_PATH}"),
-    "a bomb": (_zeros(150), "would take 15"),
 }
 
 
@@ -138,7 +126,7 @@ def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_
 
 
 def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp_path: Path) -> None:
-    content = bytearray(_archive(_zeros(20)).getvalue())
+    content = bytearray(_archive(_member("resources/zeros.bin", bytes(20_000_000))).getvalue())
     for sign, offset in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
         struct.pack_into("<I", content, content.rindex(sign) + offset, 1000)
     with pytest.raises(FileError, match=r"^a\.fmu: member 'resources/zeros.bin': its header and its content must"):

@@ -42,7 +42,8 @@ def is_refused(content: bytes, path: Path) -> bool:
     return False
 
 
-def flipped(content: bytes, offset: int, bit: int) -> bytes:
+def flipped(content: bytes, offset: int, bit: int = 0) -> bytes:
+    """Return the content with another bit at a place."""
     return content[:offset] + bytes([content[offset] ^ 1 << bit]) + content[offset + 1 :]
 
 
@@ -65,15 +66,6 @@ def test_no_bit_of_an_archive_can_be_changed(stride: int, small: bytes, tmp_path
                 assert is_refused(flipped(small, offset, bit), path), (offset, bit)
 
 
-@often("count", 30, 500, 2000)
-def test_no_bit_of_the_shipped_fmu_can_be_changed(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
-    content, draws = videoray_fmu.read_bytes(), random.Random(count)
-    assert not is_refused(content, tmp_path / "videoray.fmu")
-    for _ in range(count):
-        offset, bit = draws.randrange(len(content)), draws.randrange(8)
-        assert is_refused(flipped(content, offset, bit), tmp_path / "videoray.fmu"), (offset, bit)
-
-
 def _pieces(content: bytes, draws: random.Random) -> Iterator[bytes]:
     """Yield pieces of bytes of every kind: random ones, zeros, parts of the archive, and a whole archive."""
     while True:
@@ -82,14 +74,6 @@ def _pieces(content: bytes, draws: random.Random) -> Iterator[bytes]:
         yield bytes(draws.randint(1, 100))
         yield content[begin : begin + draws.randint(1, 1000)]
         yield archive({"binaries/linux64/other.so": b"evil"})
-
-
-@often("count", 12, 200)
-def test_nothing_can_be_inserted_before_within_or_after(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
-    content, draws = videoray_fmu.read_bytes(), random.Random(count)
-    for n, piece in zip(range(count), _pieces(content, draws), strict=False):
-        offset = (0, len(content), draws.randrange(len(content)))[n % 3]
-        assert is_refused(content[:offset] + piece + content[offset:], tmp_path / "videoray.fmu"), (n, offset)
 
 
 def test_an_empty_block_in_the_compressed_bytes_is_found(small: bytes, tmp_path: Path) -> None:
@@ -229,6 +213,7 @@ def _without_signatures(content: bytes) -> bytes:
 
 
 HONEST: dict[str, Callable[[], bytes]] = {
+    "ours": lambda: archive(_FILES),
     "plain": lambda: _written(_plain),
     "stored, with extra fields and comments": lambda: _written(_with_extra_fields),
     "with folders and a comment": lambda: _written(_with_folders),

@@ -34,6 +34,7 @@ from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import BARE, make_key
 from tests.conftest import Made, without_page
 from tests.often import often, spread
+from tests.prove.test_properties import flipped
 from tests.vehicles import THRUST_EFFECTS
 
 Capsys = pytest.CaptureFixture[str]
@@ -222,11 +223,6 @@ def _read(fmu: Path) -> dict[str, bytes]:
         return {name: zipped.read(name) for name in zipped.namelist()}
 
 
-def _flipped(content: bytes, place: int) -> bytes:
-    """Return the content with another byte at a place."""
-    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
-
-
 @pytest.fixture
 def refused(capsys: Capsys) -> Callable[..., str]:
     """Return a function that proves an FMU, which must fail with one line, and returns the reason."""
@@ -262,7 +258,7 @@ def test_one_altered_byte_is_named(
     place = len(files[name]) // 2
     if name == META_DATA:
         place = files[name].index(b'">', place) + 2  # in a hash, and not in the XML around it
-    altered = {**files, name: _flipped(files[name], place)}
+    altered = {**files, name: flipped(files[name], place)}
     assert re.fullmatch(
         re.escape(f"'{name}' was altered after the FMU was built: ")
         + r"its SHA3-256 is [0-9a-f]{16}…, and was [0-9a-f]{16}…\n",
@@ -279,7 +275,7 @@ def test_no_byte_of_the_meta_data_can_be_altered(stride: int, tmp_path: Path) ->
         content = zipped.read(META_DATA)
     for n in range(0, len(content), stride):
         fmu = tmp_path / "altered.fmu"
-        fmu.write_bytes(archive(files, lambda _, n=n: _flipped(content, n)))  # type: ignore[misc]
+        fmu.write_bytes(archive(files, lambda _, n=n: flipped(content, n)))  # type: ignore[misc]
         with pytest.raises((ProofError, FileError)) as error:
             check_evidence(fmu)
         assert META_DATA in str(error.value)[: len(str(fmu)) + len(META_DATA) + 6], (n, str(error.value))
@@ -307,7 +303,7 @@ def test_a_byte_changed_in_the_archive_itself_names_the_file(
     with zipfile.ZipFile(videoray_fmu) as zipped:
         entry = next(entry for entry in zipped.infolist() if entry.filename.startswith("binaries/"))
     fmu = tmp_path / "damaged.fmu"
-    fmu.write_bytes(_flipped(videoray_fmu.read_bytes(), entry.header_offset + 1000))
+    fmu.write_bytes(flipped(videoray_fmu.read_bytes(), entry.header_offset + 1000))
     assert refused(fmu).startswith(f"'{entry.filename}' was altered after the FMU was built: ")
 
 
@@ -367,7 +363,7 @@ def test_no_letter_of_a_signature_can_be_altered(signed_fmu: Path, tmp_path: Pat
     fmu = Path(shutil.copy(signed_fmu, tmp_path))
     good = Path(f"{signed_fmu}.sig").read_bytes()
     for n in [n for n, byte in enumerate(good) if not chr(byte).isspace()][::17]:
-        Path(f"{fmu}.sig").write_bytes(_flipped(good, n))
+        Path(f"{fmu}.sig").write_bytes(flipped(good, n))
         with pytest.raises((ProofError, FileError)) as error:
             check_signature(fmu)
         assert f"{fmu}.sig" in str(error.value)
