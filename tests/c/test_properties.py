@@ -173,13 +173,14 @@ def test_steps_of_any_length_agree(name: str) -> None:
     near(lanes, alone, 1e-10 if name == "six axes" else SCALE)
 
 
-def test_a_vehicle_that_cannot_be_computed_affects_no_other_and_the_next_one_takes_its_lane() -> None:
+@pytest.mark.parametrize("lanes", [True, False])
+def test_a_vehicle_that_cannot_be_computed_affects_no_other_and_the_next_one_takes_its_lane(lanes: bool) -> None:
     times, start = np.arange(0.0, 5.0, 0.01), np.full((VEHICLES, 1), 0.1)
     commands = np.full((VEHICLES, len(times)), 0.4)
-    good = simulate(VIDEORAY, times, {"u_l": commands, "r": start}, vehicles=VEHICLES, lanes=True).values
+    good = simulate(VIDEORAY, times, {"u_l": commands, "r": start}, vehicles=VEHICLES, lanes=lanes).values
     start[[3, 4, 11], 0] = np.nan, np.inf, 1e300
     commands[5, 100:] = np.nan
-    found = simulate(VIDEORAY, times, {"u_l": commands, "r": start}, vehicles=VEHICLES, lanes=True)
+    found = simulate(VIDEORAY, times, {"u_l": commands, "r": start}, vehicles=VEHICLES, lanes=lanes)
     expected = np.full(VEHICLES, len(times))
     expected[[3, 4, 5, 11]] = 1, 1, 101, 1
     assert found.failed.tolist() == expected.tolist()

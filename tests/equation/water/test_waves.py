@@ -1,16 +1,13 @@
 """A vehicle in waves: the velocity, acceleration and elevation of the water are inputs (docs/waves.md)."""
 
 import random
-from math import atan, cos, exp, pi, sin
+from math import atan
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle, without_surface
@@ -18,7 +15,7 @@ from rov_fmu.vehicle.writer import vehicle_text
 from tests.equation.steps import in_engine, in_python
 from tests.fmi import OK
 from tests.fmu.calls.conftest import WRAPPERS
-from tests.vehicles import SIX, a_vehicle, at_rest, in_waves, random_inputs, random_state, still, surfaced
+from tests.vehicles import SIX, a_vehicle, in_waves, random_inputs, random_state, surfaced
 from verification.references.rigid_vehicle import compared, integrate, places
 
 G = 9.80665
@@ -38,15 +35,6 @@ def test_a_step_in_accelerated_water_is_exact(name: str) -> None:
         for step in (in_python, in_engine):
             moved = compared(rov, places(rov, step(rov, inputs, state, h)))
             assert [float(x) for x in moved] == pytest.approx(exact, rel=1e-11, abs=1e-11)
-
-
-@pytest.mark.parametrize("name", ROVS)
-def test_the_water_drives_all_axes(name: str) -> None:
-    """So the comparison above would fail without the terms of the acceleration."""
-    rov = in_waves(ROVS[name])
-    rates = [rov.derivatives(still(rov) | {"A_N": 1.0, "A_E": 1.0, "A_D": a}, at_rest(rov)) for a in (0.0, 1.0)]
-    assert all(rates[0][v] != 0.0 for v in "uv")
-    assert rates[0]["w"] != rates[1]["w"]
 
 
 @pytest.mark.parametrize("rov", [BLUEROV2, HEAVY, VIDEORAY, SIX], ids=["BlueROV2", "Heavy", "VideoRay", "six axes"])
@@ -83,28 +71,6 @@ def test_a_righting_moment_aligns_with_what_a_plumb_line_shows() -> None:
     np.testing.assert_allclose(
         down, simulate(lighter, times, {"z": 5.0, "u_1": 0.3}, ["u", "w", "p", "z"]).values, atol=1e-12
     )
-
-
-@pytest.mark.parametrize(("h", "limit"), [(0.02, 1e-4), (0.1, 3e-3)])
-def test_a_neutral_vehicle_follows_the_particle_of_water(h: float, limit: float) -> None:
-    """The water's velocity is that of the middle of the next step, at the place that the vehicle then has."""
-    a, omega = 0.25, 2.0 * pi / 6.0
-    k = omega**2 / G
-
-    def water(t: float, y: NDArray[np.float64]) -> list[float]:
-        speed, phase = a * omega * exp(-k * y[1]), omega * t - k * y[0]
-        return [speed * cos(phase), speed * sin(phase)]
-
-    rov = in_waves(HEAVY).with_(m_rov=13.4, W=13.4 * G, B=13.4 * G)
-    stepper, inputs = Stepper(rov, {"z": 3.0}, ["x", "z", "vg_N", "vg_D"]), rov.layout.usual_inputs
-    now, path = np.array([0.0, 3.0, 0.0, 0.0]), [[0.0, 3.0]]
-    for n in range(round(30.0 / h)):
-        V_N, V_D = water((n + 0.5) * h, now[:2] + 0.5 * h * now[2:])
-        now = np.array(stepper.step([*(inputs | {"V_N": V_N, "V_D": V_D}).values()], h))
-        path.append(now[:2].tolist())
-    times = h * np.arange(len(path))
-    particle = solve_ivp(water, (0.0, 30.1), [0.0, 3.0], t_eval=times, rtol=1e-10, atol=1e-12).y.T
-    assert np.linalg.norm(np.array(path) - particle, axis=1).max() < limit
 
 
 @pytest.mark.parametrize(
