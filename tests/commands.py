@@ -131,6 +131,14 @@ print(json.dumps(ends))
 """
 
 
+def python(*arguments: str, **how: Any) -> str:
+    """Run Python in another process, in the checkout by default, and return what it prints. It must end well."""
+    given = {"cwd": ROOT, "capture_output": True, "text": True, **how}
+    ran = subprocess.run([sys.executable, *arguments], check=False, **given)
+    assert ran.returncode == 0, ran.stderr
+    return str(ran.stdout)
+
+
 def run_elsewhere(
     commands: Sequence[Sequence[str]], folder: Path, prefix: Sequence[str] = (), **how: Any
 ) -> list[tuple[int, str]]:

@@ -2,7 +2,6 @@
 
 import ast
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -16,7 +15,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import rov_fmu
-from tests.commands import ROOT
+from tests.commands import ROOT, python
 
 # From the top down. A part imports from itself and from parts below it.
 PARTS = (
@@ -312,4 +311,4 @@ def test_the_commands_of_the_readme_need_no_extra() -> None:
     extra = [name for name, of in modules.items() if not of & installed and name not in sys.stdlib_module_names]
     used = ["rov_fmu.cli", "rov_fmu.build", "rov_fmu.identify.identify", "rov_fmu.report.report", "examples.tank_tests"]
     program = _WITHOUT.format(extra, ", ".join(used))
-    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
+    python("-c", program)

@@ -7,7 +7,6 @@ the package.
 import atexit
 import importlib
 import re
-import subprocess
 import sys
 from contextlib import ExitStack
 from dataclasses import replace
@@ -34,7 +33,7 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, without_surface
-from tests.commands import BARE, ROOT
+from tests.commands import BARE, ROOT, python
 from tests.often import spread
 from tests.vehicles import VEHICLES, frictionless, in_waves, passed, tied
 from verification.references.rigid_body import Body
@@ -603,7 +602,7 @@ def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path, monkeyp
     monkeypatch.setattr("rov_fmu.bridges.mujoco.HOSTS", HOST)
     assert main(["export", "bluerov2", "--to", "mujoco", "-o", str(tmp_path / "rov")]) == 0
     program = "import runpy, sys; sys.modules['rov_fmu'] = None; sys.argv[1:] = ['rov.png']; runpy.run_module('rov')"
-    subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True, timeout=60)
+    python("-c", program, cwd=tmp_path, timeout=60)
     picture = (tmp_path / "rov.png").read_bytes()
     assert picture.startswith(b"\x89PNG\r\n\x1a\n")
     assert int.from_bytes(picture[16:20]) == 1280

@@ -1,8 +1,6 @@
 """vehicle.rates with NumPy, CasADi and JAX agrees with the engine over random states of all vehicles."""
 
 import random
-import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +14,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ROOT
+from tests.commands import python
 from tests.vehicles import (
     EVERYTHING,
     SIX,
@@ -90,10 +88,7 @@ def test_numpy_and_casadi_agree_with_the_engine(name: str) -> None:
 @pytest.mark.weekly
 def test_jax_agrees_with_the_engine() -> None:
     """The program runs in a process of its own: JAX starts threads, and other tests start processes by forks."""
-    program = [sys.executable, "-m", "tests.bridges.jax_rates"]
-    ran = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout.splitlines() == [*ALL]
+    assert python("-m", "tests.bridges.jax_rates").splitlines() == [*ALL]
 
 
 def test_the_coefficients_may_be_symbols() -> None:

@@ -18,7 +18,7 @@ from rov_fmu.c.compile import PLATFORMS, host_platform
 from rov_fmu.cli import _Command, _commands, main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import BARE, ROOT, without_progress
+from tests.commands import BARE, ROOT, python, without_progress
 from tests.conftest import without_page
 from tests.often import spread
 
@@ -98,8 +98,7 @@ def test_a_command_imports_what_it_uses() -> None:
 
 def test_a_vehicle_is_loaded_without_what_takes_long_to_import() -> None:
     script = "import sys, rov_fmu; rov_fmu.load('videoray'); print(*sys.modules)"
-    ran = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert {*ran.stdout.split()} & {*_SLOW} == {"pydantic"}
+    assert {*python("-c", script).split()} & {*_SLOW} == {"pydantic"}
 
 
 # ---- Help and list ---------------------------------------------------------------------------------------------------

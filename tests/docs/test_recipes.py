@@ -7,13 +7,11 @@ unit (power), and a log format (.jsonl).
 import json
 import os
 import shutil
-import subprocess
-import sys
 from typing import Any
 
 import pytest
 
-from tests.commands import ROOT
+from tests.commands import ROOT, python
 
 _BEHIND, _BEFORE = "behind", "before"
 RECIPES = {
@@ -197,16 +195,8 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     (package / "tank" / "readers" / "jsonl.py").write_text(JSONL, encoding="utf-8")
     rows = ({"time [s]": 0.1 * n, "command [%]": 30, "depth [m]": 0.01 * n} for n in range(100))
     (scratch / "dive_heave.jsonl").write_text("\n".join(map(json.dumps, rows)), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", CHECK, str(scratch / "dive_heave.jsonl")],
-        env={**os.environ, "PYTHONPATH": str(scratch)},
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=scratch,
-    )
-    assert done.returncode == 0, done.stderr
-    answers: dict[str, Any] = json.loads(done.stdout)
+    there = {"env": {**os.environ, "PYTHONPATH": str(scratch)}, "cwd": scratch}
+    answers: dict[str, Any] = json.loads(python("-c", CHECK, str(scratch / "dive_heave.jsonl"), **there))
     return answers
 
 

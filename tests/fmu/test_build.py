@@ -1,7 +1,5 @@
 """The archive that a build writes."""
 
-import subprocess
-import sys
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,7 +15,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import META_DATA
 from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import BARE
+from tests.commands import BARE, python
 from tests.conftest import compile_anew
 
 
@@ -125,8 +123,4 @@ def test_after_a_build_fmpy_prints_what_an_fmu_says(videoray_fmu: Path) -> None:
         "path = Path(sys.argv[1])\n_check(path, rov_fmu.load('videoray'), None, 2)\ngc.collect()\n"
         "fmpy.simulate_fmu(str(path), start_values={'u_t': -0.5}, stop_time=1.0)\n"
     )
-    ran = subprocess.run(
-        [sys.executable, "-c", program, str(videoray_fmu)], capture_output=True, text=True, check=False
-    )
-    assert ran.returncode == 0, ran.stderr
-    assert "the vehicle has left the water" in ran.stdout
+    assert "the vehicle has left the water" in python("-c", program, str(videoray_fmu))

@@ -4,8 +4,6 @@ import json
 import os
 import random
 import shutil
-import subprocess
-import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -26,6 +24,7 @@ from rov_fmu.fmu.python_flavour import python_sources
 from rov_fmu.fmu.slave import Rov
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import python
 from tests.conftest import Made, unzipped, without_page
 from tests.fmi import OK
 from tests.fmu.calls.test_arguments import STOPS
@@ -319,9 +318,7 @@ def test_every_path_of_the_resources_is_found(tmp_path: Path, python_dir: Path) 
     folders = [tmp_path / name for name in ("plain", "u ml\u00e4ut", "plus+x", "hash#x", "pct%20x", "quo'te", "p%te")]
     for folder in folders:
         shutil.copytree(python_dir, folder)
-    done = subprocess.run([sys.executable, "-c", FLY, *map(str, folders)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    first, *others = done.stdout.split()
+    first, *others = python("-c", FLY, *map(str, folders)).split()
     assert float(first) > 0.1
     assert others == [first] * 6
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_wheel import CONSTRAINTS, built, interpreter, pinned_environment
-from tests.commands import BARE, ROOT
+from tests.commands import BARE, ROOT, python
 from tests.conftest import Made
 from verification.fresh_environment import environment
 
@@ -50,12 +50,8 @@ sys.stdout.write(repr([*content.files.items(), *content.sources.items()]))
 
 def test_the_order_of_sets_changes_no_byte() -> None:
     """Python puts texts in a set in another order in each process."""
-    command = [sys.executable, "-c", _CONTENT, str(BARE)]
-    made = [
-        subprocess.run(command, check=True, cwd=ROOT, env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True)
-        for seed in "12"
-    ]
-    assert len({one.stdout for one in made}) == 1
+    made = [python("-c", _CONTENT, str(BARE), env=os.environ | {"PYTHONHASHSEED": seed}) for seed in "12"]
+    assert made[0] == made[1]
 
 
 @pytest.mark.weekly

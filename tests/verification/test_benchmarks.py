@@ -1,12 +1,11 @@
 """The command of the benchmarks prints all of them."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from lxml import etree
 
+from tests.commands import python
 from verification.benchmarks import taylor
 from verification.benchmarks.plain_c import measurable
 
@@ -18,8 +17,7 @@ in_plain_c = pytest.mark.skipif(not measurable(), reason="the C programs are wri
 @in_plain_c
 def test_one_command_prints_it_all(tmp_path: Path) -> None:
     picture = tmp_path / "cost_error.svg"
-    command = [sys.executable, "-m", "verification.benchmarks", "--quick", "--picture", str(picture)]
-    printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
+    printed = python("-m", "verification.benchmarks", "--quick", "--picture", str(picture), encoding="utf-8")
     parts = (
         "turning",
         "fmi3SetFloat64",

@@ -4,8 +4,6 @@ import csv
 import io
 import os
 import platform
-import subprocess
-import sys
 from collections.abc import Mapping
 from functools import cache
 from math import e
@@ -21,7 +19,7 @@ from rov_fmu.fmu.archive import FOLDER, MANIFEST, archive
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ROOT
+from tests.commands import python
 from tests.often import spread
 from tests.vehicles import at_rest, four_axes, still
 from verification.references import reference
@@ -218,13 +216,7 @@ print(hashlib.sha256(repr(sorted(reference_results(load_vehicle(EVERYTHING)).ite
 @pytest.mark.long
 def test_expected_results_have_the_same_bytes_whatever_the_linear_algebra_of_the_processor() -> None:
     """OpenBLAS computes other last digits on other processors. The expected results must not contain any of its."""
-    command = [sys.executable, "-c", _HASH]
     cores = ("Haswell", "SkylakeX", "Zen") if platform.machine() in ("x86_64", "AMD64") else ("ARMV8",)
-    found = {
-        subprocess.run(
-            command, env=os.environ | {"OPENBLAS_CORETYPE": core}, cwd=ROOT, check=True, capture_output=True, text=True
-        ).stdout
-        for core in cores
-    }
+    found = {python("-c", _HASH, env=os.environ | {"OPENBLAS_CORETYPE": core}) for core in cores}
     assert len(found) == 1
     assert len(found.pop()) == 65
