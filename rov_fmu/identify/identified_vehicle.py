@@ -131,7 +131,9 @@ def _head(tests: Tests) -> dict[str, Any]:
     files that are used, which may have changed since."""
     head = dict(tests.description.tables.vehicle or ())
     if head and head["description"] == DRAFTED.format(head["source"]):
-        files = [name for name in tests.folder.inputs if name not in (ROV_FILE, tests.description.base_name)]
+        unused = {log.whole_file for log in tests.folder.logs if not any(c.quantity.axis for c in log.channels)}
+        unused |= {ROV_FILE, tests.description.base_name}
+        files = [name for name in tests.folder.inputs if name not in unused]
         head["source"] = brief(", ".join(files))
         head["description"] = DRAFTED.format(head["source"])
     return head

@@ -447,7 +447,7 @@ def test_a_folder_that_cannot_be_used_is_one_line(
 
 @pytest.mark.parametrize(("written", "now"), [("old.csv", "log_heave_0.csv"), ("Nobody", "Nobody")])
 def test_the_sentence_of_a_draft_does_not_outlive_its_log(written: str, now: str, tmp_path: Path) -> None:
-    """A source that a person wrote stays."""
+    """Nor does it name a log that rov.toml leaves out of all axes. A source that a person wrote stays."""
     tests = load_tests(with_logs(tmp_path, HEAVE, 1))
     head = tests.description.tables.vehicle
     assert head
@@ -457,7 +457,8 @@ def test_the_sentence_of_a_draft_does_not_outlive_its_log(written: str, now: str
     )
     rov_file = replace(tests.folder.rov_file, description=replace(tests.description, tables=tables))
     tests.folder.rov_file = rov_file
-    tests.folder.inputs = {name: "" for name in tests.folder.inputs if not name.startswith("thrust")}
+    tests.folder.inputs = {name: "" for name in tests.folder.inputs if not name.startswith("thrust")} | {"out.csv": ""}
+    tests.folder.logs.append(replace(tests.folder.logs[0], file="out.csv", channels=()))
     found = _head(tests)
     assert found["source"] == now
     assert found["description"] == description.replace(written, now)
