@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.findings import acting, tested_in_words, told_apart
+from rov_fmu.identify.findings import acting, effect_in_words, tested_in_words, told_apart
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -276,7 +276,7 @@ RULES = (
         0.0,
         None,
         "The {name} is unusual.",
-        lambda e: {"name": listed([effect.name for effect in e.unusual])},
+        lambda e: {"name": listed([f"{one.name} ({effect_in_words(one)})" for one in e.unusual])},
         "1",
         remedy="If it is right, say so in [priors] of rov.toml.",
     ),

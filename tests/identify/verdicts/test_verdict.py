@@ -71,6 +71,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
         ({"effects": [replace(SLOW, beyond=0.96)]}, "good", ""),
+        ({"effects": [SLOW]}, "usable", "The time constant of the thrusters (0.60 s) is unusual."),
     ],
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
