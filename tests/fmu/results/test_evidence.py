@@ -311,15 +311,17 @@ def test_a_byte_changed_in_the_archive_itself_names_the_file(
 
 
 @pytest.fixture(scope="module")
-def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def keys(made_once: Made) -> Path:
     """A folder with keys, and with files that are none or cannot be used."""
-    folder = tmp_path_factory.mktemp("keys")
-    for name, secret in {"key": "", "other": "", "secret": "a word"}.items():
-        make_key(folder / name, secret)
-    for name, mode in {"text": 0o600, "open": 0o644}.items():
-        (folder / name).write_bytes((folder / "key").read_bytes() if name == "open" else b"no key\n")
-        (folder / name).chmod(mode)
-    return folder
+
+    def fill(folder: Path) -> None:
+        for name, secret in {"key": "", "other": "", "secret": "a word"}.items():
+            make_key(folder / name, secret)
+        for name, mode in {"text": 0o600, "open": 0o644}.items():
+            (folder / name).write_bytes((folder / "key").read_bytes() if name == "open" else b"no key\n")
+            (folder / name).chmod(mode)
+
+    return made_once("keys", fill)
 
 
 @pytest.fixture(scope="module")
