@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -17,13 +17,15 @@ from pydantic import (
     ValidationInfo,
     WithJsonSchema,
     create_model,
+    model_validator,
 )
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
+from typing_extensions import Self
 
 from rov_fmu.io.file_kinds import check_keys
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
+from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, listed, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes, text_of
 
@@ -37,6 +39,15 @@ class Strict(BaseModel):
     """A table of a TOML file. It may have no other keys, and no number in quotes. Editors show its docstrings."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True, defer_build=True)
+
+    one_of: ClassVar[Sequence[str]] = ()
+    """Keys of which a table has exactly one."""
+
+    @model_validator(mode="after")
+    def _has_one(self) -> Self:
+        if self.one_of and sum(getattr(self, key) is not None for key in self.one_of) != 1:
+            raise ValueError(f"must have one of {listed(self.one_of, 'or')}")
+        return self
 
     @staticmethod
     def hint(_key: str, /) -> str:

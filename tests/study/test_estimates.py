@@ -43,7 +43,9 @@ def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
 
 
 def _design(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **keys: Any) -> Design:
-    plan = Plan.model_validate({"stop_time": 1.0, "step": 1.0, "runs": 9, "vary_from": "its.toml", **keys})
+    plan = Plan.model_validate(
+        {"fmu": "its.fmu", "stop_time": 1.0, "step": 1.0, "runs": 9, "vary_from": "its.toml", **keys}
+    )
     return Design(plan, has or _has(vehicle), vehicle)
 
 

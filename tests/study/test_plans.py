@@ -49,7 +49,7 @@ WHOLE = {
 """Plans and the beginnings of the messages about them."""
 HEADS = {
     'sampler = "soboll"': "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
-    'vehicle = "videoray"': "must have one of fmu, vehicle and system",
+    'vehicle = "videoray"': "must have one of fmu, vehicle or system",
     'vary_from = "mine.toml"': "vary_from = 'mine.toml': there is no such file beside the plan",
     'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     "time_limit = 0": "time_limit = 0: must be greater than 0",
@@ -62,7 +62,7 @@ VARIED = {
     "alpha_u.uniform = [-1.0, 1.2]": "vary.alpha_u = -1.0: must be within 0 ... 1000",
     "alpha_u = { uniform = [1.0, 2.0], values = [1.0] }": "vary.alpha_u: must have one of normal, lognormal, uniform,",
     "F_l.uniform = [1.0, 2.0]": "vary.F_l: it cannot be set, because the FMU computes it",
-    "alpha_u = {}": "vary.alpha_u: must have one of normal, lognormal, uniform, values, range",
+    "alpha_u = {}": "vary.alpha_u: must have one of normal, lognormal, uniform, values or range",
     "alpha_u.uniform = [1.0, 1.0]": "vary.alpha_u.uniform = [1.0, 1.0]: must be [low, high]",
     "alpha_u.normal = { mean = -1.0, sd = 1.0 }": "vary.alpha_u = -1.0: must be within 0 ... 1000",
     "m_rov.lognormal = { median = 1e7, sd = 1.0 }": "vary.m_rov = 10000000.0: must be within 0.001 ... 1000000 kg",
@@ -83,7 +83,7 @@ TABLES = {
     "[inputs]\nu_l.steps = [[0.2, 0.5], [0.55, 0.0]]": (
         "inputs.u_l = [0.55, 0.0]: a jump, as from 0.5 here, must be at a communication point, a multiple of step"
     ),
-    "[inputs]\nu_l = {}": "inputs.u_l: must have either steps or ramps",
+    "[inputs]\nu_l = {}": "inputs.u_l: must have one of steps or ramps",
     "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.55, 0.5], [0.55, 0.0]]": "inputs.u_l = [0.55, 0.0]: a jump, as from",
     '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
     '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",

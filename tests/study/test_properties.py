@@ -27,7 +27,7 @@ def _variable(name: str) -> Variable:
 
 
 def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcdenw") -> Design:
-    keys = {"sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
+    keys = {"fmu": "v.fmu", "sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
     plan = Plan.model_validate({**keys, "vary": {name: VARIED[name] for name in names}})
     return Design(plan, {name: _variable(name) for name in names})
 

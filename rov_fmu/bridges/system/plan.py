@@ -10,7 +10,7 @@ from typing_extensions import Self
 from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS
 from rov_fmu.fmus.description import TIME_LIMIT
 from rov_fmu.io.file_kinds import SYSTEM_PLAN, check_suffix
-from rov_fmu.io.messages import FileError, listed
+from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import AS_TUPLE, Beside, Finite, Name, Strict, Symbol, key_line, read_checked, rule
 
 MOST_STEPS = 10_000_000
@@ -58,6 +58,8 @@ SOURCES = ("vehicle", "fmu", "companion")
 class ComponentTable(Strict):
     """An FMU of a system. It has one of `vehicle`, `fmu` and `companion`."""
 
+    one_of = SOURCES
+
     vehicle: Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
     fmu: Beside | None = None
@@ -80,11 +82,8 @@ class ComponentTable(Strict):
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
-        given = [key for key in SOURCES if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(f"must have one of {listed(SOURCES, 'or')}")
         for key, needs in (("file", "companion"), ("point", "vehicle")):
-            if getattr(self, key) and given != [needs]:
+            if getattr(self, key) and getattr(self, needs) is None:
                 raise ValueError(f"{key} needs {needs}")
         if (self.held is not None) != (self.companion == AUTOPILOT):
             raise ValueError('for = "component" belongs to companion = "autopilot", which needs it')

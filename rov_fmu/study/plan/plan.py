@@ -97,12 +97,7 @@ class Varied(Strict):
     range: Spaced | None = None
     """{ from = ..., to = ..., count = ... }; each is as likely as the others."""
 
-    @model_validator(mode="after")
-    def _in_one_way(self) -> Self:
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(f"must have one of {', '.join(type(self).model_fields)}")
-        return self
+    one_of = ("normal", "lognormal", "uniform", "values", "range")
 
     @property
     def choices(self) -> tuple[float, ...] | None:
@@ -154,11 +149,7 @@ class InputSignal(Strict):
     """[[time, value], ...]: straight lines between the points; two points with the same time make a jump, at a
     communication point. The FMU gets the value at the middle of each step."""
 
-    @model_validator(mode="after")
-    def _either(self) -> Self:
-        if (self.steps is None) == (self.ramps is None):
-            raise ValueError("must have either steps or ramps")
-        return self
+    one_of = ("steps", "ramps")
 
     @property
     def points(self) -> Points:
@@ -217,6 +208,8 @@ def _expression(text: str) -> str:
 
 class Plan(Strict):
     """A study: many runs of one vehicle, of one FMU, or of one system of FMUs."""
+
+    one_of = ("fmu", "vehicle", "system")
 
     title: Name | None = None
     """The heading of the page."""
@@ -331,8 +324,6 @@ def load_plan(path: Path) -> Plan:
 
 
 def _contradictions(plan: Plan) -> Iterator[str]:
-    if [plan.fmu, plan.vehicle, plan.system].count(None) != 2:
-        yield "must have one of fmu, vehicle and system"
     if plan.stop_time <= plan.start_time:
         yield key_line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
     elif not _whole((plan.stop_time - plan.start_time) / plan.step):
