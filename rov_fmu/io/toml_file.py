@@ -337,6 +337,8 @@ def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Keys], model: type[St
 def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str:
     """Return the line for one problem."""
     keys, kind, value = problem["loc"], problem["type"], problem["input"]
+    if not keys:  # a rule about the whole file
+        return _reason(problem, model)
     *above, last = keys
     is_table = isinstance(value, dict)
     key = brief(_key(keys, data))

@@ -71,7 +71,7 @@ WRONG = {
     '"a.z".steps': ('"b.z".steps', "inputs.b.z: is no input of the FMU; its causality is connected"),
     "final(a.V_N)": ("final(a.V_X)", "figures.first = 'final(a.V_X)': 'a.V_X' is neither a function nor a variable"),
     'system = "my.ssp"': ('system = "plan.toml"', "must be a system (SSP), and not a TOML file"),
-    "runs = 6": ('vehicle = "videoray"\nruns = 6', "must have one of fmu, vehicle and system"),
+    "runs = 6": ('vehicle = "videoray"\nruns = 6', "must have one of fmu, vehicle or system"),
 }
 
 

@@ -57,23 +57,76 @@ class Design:
 
     def rows(self, first: int, end: int) -> Array:
         """Return the values from run `first` to the one before `end`: a row per run, a column per variable."""
-        (known, numbers), plan = self._drawn, self._plan
-        drawn, together = numbers.draw(first, end), len(known.names)
+        draws = {"grid": self._grid, "sobol": self._sobol, "saltelli": self._saltelli, "random": self._random}
+        draws["latin-hypercube"] = lambda first, end: self._hypercube[first:end]
+        drawn, together = draws[self._plan.sampler](first, end), len(self._known.names)
         found = np.empty_like(drawn)
-        found[:, :together] = known.drawn(drawn[:, :together])
-        for n, (name, varied) in enumerate(plan.vary.items(), together):
+        found[:, :together] = self._within_bounds.drawn(drawn[:, :together])
+        for n, (name, varied) in enumerate(self._plan.vary.items(), together):
             with np.errstate(over="ignore"):
                 found[:, n] = _values(varied, self._has[name], drawn[:, n])
         return np.clip(found, -_LARGEST, _LARGEST)
 
     @cached_property
-    def _drawn(self) -> tuple[Uncertainty, "_Numbers"]:
-        """The distribution of the estimates within the bounds of the FMU's variables, and what draws the numbers."""
-        known, plan = self._known, self._plan
+    def _within_bounds(self) -> Uncertainty:
+        """The distribution of the estimates within the bounds of the FMU's variables."""
+        known = self._known
         own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in known.names]).reshape(-1, 2)
         bounds = [np.maximum(known.bounds, own)[:, 0], np.minimum(known.bounds, own)[:, 1]]
-        groups = [[self.names.index(name) for name in group] for group in self.groups]
-        return replace(known, bounds=np.column_stack(bounds)), _Numbers(plan, groups, self.runs)
+        return replace(known, bounds=np.column_stack(bounds))
+
+    # ---- Numbers in 0 ... 1: a row for each run, and a column for each variable --------------------------------------
+
+    def _grid(self, first: int, end: int) -> Array:
+        """Go through all combinations; the last variable changes fastest."""
+        counts = [len(varied.choices or ()) for varied in self._plan.vary.values()]
+        drawn = np.empty((end - first, len(counts)))
+        _, *indices = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
+        for column, index in enumerate(indices):
+            drawn[:, column] = (index + 0.5) / counts[column]
+        return drawn
+
+    @cached_property
+    def _sequence(self) -> qmc.Sobol:
+        """A Sobol sequence with Owen scrambling."""
+        return qmc.Sobol(len(self.names) * (1 + (self._plan.sampler == "saltelli")), seed=self._plan.seed)
+
+    def _sobol(self, first: int, end: int) -> Array:
+        """Continue after the last number drawn where possible."""
+        source = self._sequence
+        if first < source.num_generated:
+            source.reset()
+        if first > source.num_generated:
+            source.fast_forward(first - source.num_generated)
+        with warnings.catch_warnings():  # about samples whose length is not a power of two
+            warnings.simplefilter("ignore", UserWarning)
+            return np.asarray(source.random(end - first))
+
+    def _saltelli(self, first: int, end: int) -> Array:
+        """Draw blocks of rows: a row of a matrix A; for each group, this row with the group's columns of B; the row of
+        B.
+
+        The method is that of Saltelli et al. (2010), with groups of correlated variables by Jacques et al. (2006). The
+        order is that of SALib. A and B are the halves of a Sobol sequence.
+        """
+        width, block = len(self.names), len(self.groups) + 2
+        rows, start = np.arange(first, end), first // block
+        both = self._sobol(start, (end - 1) // block + 1)[rows // block - start]
+        drawn, indices = both[:, :width].copy(), rows % block
+        for n, group in enumerate(self.groups):
+            of_b = (indices == n + 1) | (indices == block - 1)
+            for column in map(self.names.index, group):
+                drawn[of_b, column] = both[of_b, width + column]
+        return drawn
+
+    @cached_property
+    def _hypercube(self) -> Array:
+        return np.asarray(qmc.LatinHypercube(len(self.names), seed=self._plan.seed).random(self.runs))
+
+    def _random(self, first: int, end: int) -> Array:
+        """Draw independent numbers; each run has its own place in the sequence of a generator that can jump."""
+        source = np.random.PCG64(self._plan.seed).advance(first * len(self.names))
+        return np.random.Generator(source).random((end - first, len(self.names)))
 
     # ---- What does not fit, and what a reader may not expect ---------------------------------------------------------
 
@@ -187,73 +240,3 @@ def _normal(mean: float, sd: float, low: float, high: float, drawn: Array) -> Ar
     below, above = ndtr((low - mean) / sd), ndtr((high - mean) / sd)
     inside = np.clip(drawn, 1e-14, 1.0 - 1e-14)
     return np.asarray(mean + sd * ndtri(below + inside * (above - below)))
-
-
-# ---- Numbers in 0 ... 1 ----------------------------------------------------------------------------------------------
-
-
-class _Numbers:
-    """Numbers in 0 ... 1 by the sampler of a plan: a row for each run, and a column for each variable."""
-
-    def __init__(self, plan: Plan, groups: Sequence[Sequence[int]], runs: int) -> None:
-        """`groups` has the columns of each group of correlated variables."""
-        self._plan, self._groups, self._runs, self._width = plan, groups, runs, sum(map(len, groups))
-        self.draw = {
-            "grid": self._grid,
-            "sobol": self._sobol,
-            "saltelli": self._saltelli,
-            "latin-hypercube": lambda first, end: self._hypercube[first:end],
-            "random": self._random,
-        }[plan.sampler]
-        """Returns the rows from a first run to the one before another."""
-
-    def _grid(self, first: int, end: int) -> Array:
-        """Go through all combinations; the last variable changes fastest."""
-        counts = [len(varied.choices or ()) for varied in self._plan.vary.values()]
-        drawn = np.empty((end - first, len(counts)))
-        _, *indices = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
-        for column, index in enumerate(indices):
-            drawn[:, column] = (index + 0.5) / counts[column]
-        return drawn
-
-    @cached_property
-    def _sequence(self) -> qmc.Sobol:
-        """A Sobol sequence with Owen scrambling."""
-        return qmc.Sobol(self._width * (1 + (self._plan.sampler == "saltelli")), seed=self._plan.seed)
-
-    def _sobol(self, first: int, end: int) -> Array:
-        """Continue after the last number drawn where possible."""
-        source = self._sequence
-        if first < source.num_generated:
-            source.reset()
-        if first > source.num_generated:
-            source.fast_forward(first - source.num_generated)
-        with warnings.catch_warnings():  # about samples whose length is not a power of two
-            warnings.simplefilter("ignore", UserWarning)
-            return np.asarray(source.random(end - first))
-
-    def _saltelli(self, first: int, end: int) -> Array:
-        """Draw blocks of rows: a row of a matrix A; for each group, this row with the group's columns of B; the row of
-        B.
-
-        The method is that of Saltelli et al. (2010), with groups of correlated variables by Jacques et al. (2006). The
-        order is that of SALib. A and B are the halves of a Sobol sequence.
-        """
-        width, block = self._width, len(self._groups) + 2
-        rows, start = np.arange(first, end), first // block
-        both = self._sobol(start, (end - 1) // block + 1)[rows // block - start]
-        drawn, indices = both[:, :width].copy(), rows % block
-        for n, group in enumerate(self._groups):
-            of_b = (indices == n + 1) | (indices == block - 1)
-            for column in group:
-                drawn[of_b, column] = both[of_b, width + column]
-        return drawn
-
-    @cached_property
-    def _hypercube(self) -> Array:
-        return np.asarray(qmc.LatinHypercube(self._width, seed=self._plan.seed).random(self._runs))
-
-    def _random(self, first: int, end: int) -> Array:
-        """Draw independent numbers; each run has its own place in the sequence of a generator that can jump."""
-        source = np.random.PCG64(self._plan.seed).advance(first * self._width)
-        return np.random.Generator(source).random((end - first, self._width))
