@@ -18,7 +18,9 @@ from tests.tank.readers.writers import LOGS
 
 LOGS_OF_OTHERS = ROOT / "tests" / "frozen" / "logs" / "other_files"
 Capsys = pytest.CaptureFixture[str]
-LOG = "time [s],u_t [%],depth [m]\n" + "".join(f"{n / 10},{20 * (n // 40 % 3 - 1)},{n % 50}\n" for n in range(200))
+LOG = "time [s],u_t [%],depth [m]\n" + "".join(
+    f"{n / 10},{20 * (n // 40 % 3 - 1)},{abs(n % 100 - 50)}\n" for n in range(200)
+)
 
 
 SILENT = (".hidden.csv", "._dive.mcap", "mine.toml", "mine.fmu", "report.html", "Thumbs.db", "photos/._dive.csv")
