@@ -34,3 +34,9 @@ def usual_range(values: Array) -> tuple[float, float]:
 def rms(values: Array) -> float:
     """Return the root of the mean of the squares of values."""
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def true_runs(flags: Flags) -> list[tuple[int, int]]:
+    """Return the first and the last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    return [(int(start), int(end) - 1) for start, end in edges.reshape(-1, 2)]

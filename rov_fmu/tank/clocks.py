@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, true_runs
 
 Name = TypeVar("Name")
 Number = TypeVar("Number", bound=np.generic)
@@ -51,11 +51,11 @@ def restart_rows(time: Array) -> list[int]:
     if not len(time):
         return []
     goes_on = np.append(False, (time < np.maximum.accumulate(time))[1:] & (np.diff(time) >= 0.0))
-    edges = np.flatnonzero(np.diff(goes_on, prepend=False, append=False))
-    for start, end in (edges.reshape(-1, 2) - (1, 0)).tolist():  # the first row goes back, the others go on
-        before, last = time[:start], time[end - 1]
-        again = ((before >= time[start]) & (before <= last)).sum() >= AGAIN * (end - start)
-        if end - start >= LEAST_AFTER and (again or last < before.min()):
+    for first, end in true_runs(goes_on):
+        start = first - 1  # this row goes back, the others go on
+        before, last, count = time[:start], time[end], end - start + 1
+        again = ((before >= time[start]) & (before <= last)).sum() >= AGAIN * count
+        if count >= LEAST_AFTER and (again or last < before.min()):
             return [start, *(start + row for row in restart_rows(time[start:]))]
     return []
 

@@ -26,7 +26,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of, listed
-from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.arrays import Array, Flags, true_runs
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import about
@@ -137,7 +137,7 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
     is_depth, near, still = axis is HEAVE, _NEAR * height, _STILL * height
     agrees = course.share > _SLOW
     slow = (course.share < _SLOW) & (is_depth | (np.abs(course.drag) < _STANDS))
-    for start, end in _runs(slow):  # shorter ones come from pushes that change within a window
+    for start, end in true_runs(slow):  # shorter ones come from pushes that change within a window
         slow[start : end + 1] = end - start >= _HALF // 2
     least = _LEAST if is_depth else _LEAST_HORIZONTAL
     top = float(place[agrees].min(initial=np.inf))  # above, no push moves it
@@ -150,7 +150,7 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
         return is_depth and at < min(-height, top)
 
     rests = np.zeros(len(time), bool)
-    for start, end in _runs(_stays(place, slow, near, still)):
+    for start, end in true_runs(_stays(place, slow, near, still)):
         own, free = (start + np.flatnonzero(some[start : end + 1]) for some in (slow, agrees))
         at = float(np.median(place[own]))
         is_between = agrees[: own[0]].any() and agrees[own[-1] :].any()
@@ -159,14 +159,14 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
         if count * _STEP >= least and count > away + np.sum(np.abs(place[free] - at) < still):
             first, last = free[free < own[0]], free[free > own[-1]]
             rests[first[-1] + 1 if len(first) else start : last[0] if len(last) else end + 1] = True
-    for start, end in _runs(rests):  # nothing that dives is above the surface, or below a bottom
+    for start, end in true_runs(rests):  # nothing that dives is above the surface, or below a bottom
         side = side_of(at := float(np.median(place[start : end + 1])))
-        for first, last in _runs(side * (place - at) < near) if side else ():
+        for first, last in true_runs(side * (place - at) < near) if side else ():
             rests[first : last + 1] |= bool(np.any(side * (place[first : last + 1] - at) < still))
-    for start, end in _runs(rests):
+    for start, end in true_runs(rests):
         if in_air(float(np.median(place[start : end + 1]))):
             rests[_moved_by_hand(push, start, -1) : _moved_by_hand(push, end, 1) + 1] = True
-    for start, end in _runs(rests):
+    for start, end in true_runs(rests):
         at = float(np.median(place[start : end + 1]))
         where = f"at a depth of {at:.3g} m" if is_depth else f"no motion in {axis.name}"
         where = "on deck" if in_air(at) else "at the surface" if is_depth and at < near else where
@@ -234,9 +234,3 @@ def _moved_by_hand(told: Array, at: int, side: int) -> int:
     command changes. With -1 for `side`, since when it is lifted."""
     changes = np.flatnonzero(told[at::side] != told[at])
     return at + side * int(changes[0]) if len(changes) and abs(told[at]) < _LEAST_PUSH else at
-
-
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of true values."""
-    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
-    return [(int(start), int(end) - 1) for start, end in edges.reshape(-1, 2)]
