@@ -827,8 +827,8 @@ def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_
 @pytest.mark.parametrize(
     ("suspect", "end", "after", "is_named"),
     [
-        (DROP, 0.7, {SURGE: 1.2, YAW: 1.2}, True),
-        (DROP, 0.8, {SURGE: 1.2, YAW: 1.2}, False),
+        (DROP, 0.4, {SURGE: 1.2, YAW: 1.2}, True),
+        (DROP, 0.5, {SURGE: 1.2, YAW: 1.2}, False),
         (DEAD, 0.0, {SURGE: 1.2, YAW: 1.2}, True),
         (ROTORS, None, {SURGE: 9.0, YAW: 2.9}, True),
         (ROTORS, None, {SURGE: 9.0, YAW: 3.1}, False),
