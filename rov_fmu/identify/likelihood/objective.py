@@ -446,7 +446,7 @@ class Objective:
         sides. Those of the leading parameter of a common scale are with respect to this scale.
         """
         parameters = [self.table.parameters[into.indices[column]] for column in columns]
-        moves = [(into.indices[column], own.step) for column, own in zip(columns, parameters, strict=True)]
+        moves = [(into.indices[c], own.step_at(z[into.indices[c]])) for c, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
         moved, leading = changed(z, moves), into.leading(scale)
@@ -455,12 +455,11 @@ class Objective:
                 moved[:, column] = z + step * scale / scale[k]
         sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
-        for column, own in zip(columns, parameters, strict=True):
-            k = into.indices[column]
-            above, below = runs[k, own.step], runs.get((k, -own.step), run)
+        for column, (k, step) in zip(columns, moves, strict=False):
+            above, below = runs[k, step], runs.get((k, -step), run)
             if above is None or below is None:
                 raise DivergedError
-            width = own.step if below is run else 2.0 * own.step
+            width = step if below is run else 2.0 * step
             into.slopes[:, column] = (above.innovations - below.innovations) / width
             with np.errstate(invalid="ignore"):  # a variance that is lost in rounding makes the step diverge
                 into.log_slopes[:, column] = np.log(above.variances / below.variances) / width

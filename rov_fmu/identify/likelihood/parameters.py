@@ -63,6 +63,8 @@ _LEAST_POWER = -0.9
 _MOTION_STEP = 3e-6
 """The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
 less than a per cent."""
+_LEAST_WIDTH = 0.1
+"""The least width, relative to the time between two rows, that a derivative compares with none."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,15 @@ class Parameter(Coordinate):
         if not self.of_motion:
             return 1e-2 if self.is_log else 1e-3
         return _MOTION_STEP * (1.0 if self.is_log else self.deviation)
+
+    def step_at(self, z: float) -> float:
+        """Return the change of z for its numerical derivative where it is z.
+
+        What the width of a window adds to the variances grows with its square. A derivative near 0 would not show it,
+        and each step of a fit would go to the mean of the prior.
+        """
+        is_width = not (self.of_motion or self.is_log)
+        return max(self.step, self.low + _LEAST_WIDTH - z) if is_width else self.step
 
 
 def has_place(sensor: Sensor) -> bool:

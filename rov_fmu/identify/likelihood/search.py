@@ -42,7 +42,6 @@ from rov_fmu.identify.likelihood.solve import (
     REST,
     Minimum,
     evidence,
-    louder,
     minimise,
     scaled,
     start_of,
@@ -491,16 +490,16 @@ def fitted(
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise begins
-    as in a first fit: that of a wrong model explains what the right one would. If a motion diverges from there, all
-    begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below
-    `enough`: a fit that will not come there is given up.
+    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise is at
+    least that of a rough vehicle: that of a wrong model explains what the right one would. If a motion diverges from
+    there, all begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is
+    below `enough`: a fit that will not come there is given up.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
     if any(HYPOTHESES[kind].changes_thrust for kind, _ in starts.keys() ^ near.starts.keys()):
-        there = louder(thinned, there)
+        there = np.where(thinned.table.each("of_motion"), there, np.maximum(there, rough(thinned.table)))
 
     def promises(end: Minimum, gain: float) -> bool:
         return evidence(thinned, end) + REST * gain > enough
@@ -781,15 +780,19 @@ class StructureSearch:
     def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
         """Yield the best sets at either of two points with the fall of J at the better one, the largest fall first.
 
-        Of the starts of one set, the best one counts. A hypothesis that made a fit worse is tried again only where J
-        falls by more than it did before that fit.
+        Of the starts of one set, the best one counts. Where J rises by much at the first point, whose noise is loud, it
+        rises more at the second one.
         """
         now = self.now
         points = self._rough, comparison(self.plain.objective, now.starts, now.minimum.z)
         before = [J(now.starts) for J in points]
-        every = ([one - J(some) for J, one in zip(points, before, strict=True)] for some in sets)
-        found = ([-inf if isnan(fall) else fall for fall in some] for some in every)
-        falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), -inf)}
+
+        def fall(some: Starts, point: int) -> float:
+            found = before[point] - points[point](some)
+            return -inf if isnan(found) else found
+
+        found = ([rough, fall(some, 1) if rough > -_FAR else -inf] for some in sets for rough in [fall(some, 0)])
+        falls = {n: some for n, some in enumerate(found) if max(some) > self._least_fall(sets[n])}
         chosen = dict[frozenset[Suspect], int]()
         for point in (0, 1):
             best = dict[frozenset[Suspect], int]()
@@ -800,6 +803,12 @@ class StructureSearch:
                 chosen.setdefault(key, n)
         order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
         yield from ((sets[n], fall) for fall, n in order)
+
+    def _least_fall(self, starts: Starts) -> float:
+        """Return by how much J must fall before a fit: by more than the prior asks of a set that wins, and than it did
+        before a fit that a hypothesis of the set made worse."""
+        price = self._prior(self.now.starts) - self._prior(starts)
+        return max(price, self.lost.get(self._new(starts), -inf), 0.0)
 
     def _new(self, starts: Starts) -> Suspect | None:
         """Return the hypothesis of a set that is not among those that won; None if there is none."""
