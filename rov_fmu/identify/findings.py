@@ -121,7 +121,9 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "moment), and is the likely cause. {coupling}{apart}"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
-        "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
+        "velocity over ground": (
+            "{what} in {files}{since}. Check for waves, a changing current, and a vehicle that touches something"
+        ),
         "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
         "coupling left out": (
             "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
