@@ -227,9 +227,10 @@ def test_in_a_system_whose_members_exchange_at_once_commands_arrive_a_step_later
 
 
 def test_prove_finds_the_expected_results_of_the_autopilot_and_a_gain_that_was_changed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are those of Python's calls of the law; the page says so, and does not ask for other steps."""
+    monkeypatch.setattr("rov_fmu.prove.measures._COST_SECONDS", 0.1)
     made = autopilot_of(VIDEORAY)
     for fmi in (2, 3):
         path = tmp_path / f"autopilot{fmi}.fmu"
