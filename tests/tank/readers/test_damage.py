@@ -23,7 +23,7 @@ from rov_fmu.tank.readers.parsers import guarded, one_parser, read_topics
 from tests.often import spread
 from tests.tank.logs import Read, measured, read_log
 from tests.tank.readers.motion import BLUEROV2, DEPTH, DIVE
-from tests.tank.readers.writers import Ros, bag, messages_of
+from tests.tank.readers.writers import Ros, bag, flash, messages_of
 
 
 def mcap(compression: CompressionType | None) -> Callable[[Path], Path]:
@@ -109,6 +109,16 @@ def test_a_file_that_was_cut_is_read_up_to_the_cut(name: str, tmp_path: Path) ->
         count = _depths(log)
         assert 30 <= count < 100
         assert any(CUT in line for line in sentences(log.findings))
+
+
+def test_what_a_parser_prints_of_a_log_is_told_as_damage(tmp_path: Path) -> None:
+    path = flash(tmp_path, DIVE)
+    content = bytearray(path.read_bytes())
+    assert not read_topics(path, []).findings
+    middle = len(content) // 2
+    content[middle : middle + 40] = b"\xa5" * 40
+    path.write_bytes(content)
+    assert [(one.kind, one.file) for one in read_topics(path, []).findings] == [("damaged log", path.name)]
 
 
 @pytest.mark.parametrize("name", spread([*RECORDED][:4], ["MCAP with zstd", "MCAP without chunks"], ["MCAP"]))
