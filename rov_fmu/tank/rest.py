@@ -26,7 +26,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of, listed
-from rov_fmu.tank.arrays import Array, Flags, true_runs
+from rov_fmu.tank.arrays import Array, Flags, Indices, true_runs, usual_range
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import about
@@ -40,17 +40,15 @@ _NEAR, _STILL = 2.0, 0.4
 surface has waves, and a bottom is not level."""
 _STEP, _HALF = 0.2, 4
 """Motion and push are compared every so many seconds, over so many steps to either side: a second derivative of a depth
-with noise of 1 cm is then known to 0.02 m/s^2."""
-_MOVES = 0.05
-"""The push of a log is learnt where the rate exceeds this, m/s: rests would spoil it."""
+with noise of 1 cm is then known to 0.03 m/s^2."""
+_MOVES = 0.1
+"""The push of a log is learnt where the rate exceeds this share of a large one: rests would spoil it."""
 _SIGNIFICANT, _LEAST_STEPS = 3.0, 40
 """An acceleration that a push should give counts above so many standard errors, and is learnt from so many steps."""
 _SLOW = 0.3
 """The motion contradicts the push where it shows less than this share of that acceleration, and else agrees with it."""
 _STANDS = 0.1
 """A vehicle stands still along surge or sway where drag takes less than this share of the push."""
-_LEAST_PUSH = 0.1
-"""The command, as a share of the full one, with which a vehicle leaves a deck by itself."""
 _LEAST, _LEAST_HORIZONTAL = 1.2, 3.0
 """The least time of contradiction in a rest in heave, and in surge or sway, s. Of the right dives, none has 1.2 s in
 heave. A DVL without lock shows 0 for about 3 s. Shorter contacts hardly count."""
@@ -150,6 +148,14 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
         return is_depth and at < min(-height, top)
 
     rests = np.zeros(len(time), bool)
+
+    def leave_out(start: int, end: int, own: Indices) -> None:
+        """Leave out a stay from the last agreement of motion and push before some steps of it to the first one after
+        them."""
+        free = start + np.flatnonzero(agrees[start : end + 1])
+        before, after = free[free < own[0]], free[free > own[-1]]
+        rests[before[-1] if len(before) else start : after[0] + 1 if len(after) else end + 1] = True
+
     for start, end in true_runs(_stays(place, slow, near, still)):
         own, free = (start + np.flatnonzero(some[start : end + 1]) for some in (slow, agrees))
         at = float(np.median(place[own]))
@@ -157,12 +163,13 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
         away = 0 if is_between or in_air(at) else np.sum(given[own] * side_of(at) >= 0.0)
         count = len(own) - away
         if count * _STEP >= least and count > away + np.sum(np.abs(place[free] - at) < still):
-            first, last = free[free < own[0]], free[free > own[-1]]
-            rests[first[-1] + 1 if len(first) else start : last[0] if len(last) else end + 1] = True
+            leave_out(start, end, own)
     for start, end in true_runs(rests):  # nothing that dives is above the surface, or below a bottom
         side = side_of(at := float(np.median(place[start : end + 1])))
         for first, last in true_runs(side * (place - at) < near) if side else ():
-            rests[first : last + 1] |= bool(np.any(side * (place[first : last + 1] - at) < still))
+            touching = first + np.flatnonzero(side * (place[first : last + 1] - at) < still)
+            if len(touching):
+                leave_out(first, last, touching)
     for start, end in true_runs(rests):
         if in_air(float(np.median(place[start : end + 1]))):
             rests[_moved_by_hand(push, start, -1) : _moved_by_hand(push, end, 1) + 1] = True
@@ -210,7 +217,8 @@ def _shares(
     known = (gap < _HALF * _STEP)[_HALF:-_HALF]
     slowing = [-rate * np.abs(rate), -rate, *(np.abs(rate) * one for one in acting[1:3] if len(others) > 1)]
     causes = np.column_stack([*acting, *slowing])
-    if np.sum(moving := known & (np.abs(rate) > _MOVES)) < _LEAST_STEPS:
+    _, large = usual_range(np.abs(rate))
+    if np.sum(moving := known & (np.abs(rate) > _MOVES * large)) < _LEAST_STEPS:
         return given, share, drag
     some, shown = causes[moving], acceleration[moving]
     weight = np.ones(len(some))
@@ -233,4 +241,4 @@ def _moved_by_hand(told: Array, at: int, side: int) -> int:
     """Return until when a vehicle that left a deck without a push is lowered by hand or by a crane: until the vertical
     command changes. With -1 for `side`, since when it is lifted."""
     changes = np.flatnonzero(told[at::side] != told[at])
-    return at + side * int(changes[0]) if len(changes) and abs(told[at]) < _LEAST_PUSH else at
+    return at + side * int(changes[0]) if len(changes) else at
