@@ -118,20 +118,12 @@ def _without_rests(logs: Sequence[Log], outputs: Sequence[str]) -> Sequence[Log]
     Which output pushes along heave is not known: each one is tried, and that counts beside whose rests the effects on
     the depth are clearest.
     """
-    best, most = logs, _clearness(logs, outputs)
-    for name in outputs:
-        thruster = Moved(frozenset(), {name: {HEAVE: 1.0}}).thrusters[name]
-        layout = Layout((VehicleAxis(HEAVE),), (), (thruster,))
-        pieces = [piece for log in logs for piece in without_rests(log, layout)]
-        if pieces != [*logs]:
-            clearness = _clearness(pieces, outputs)
-            best, most = (pieces, clearness) if clearness > most else (best, most)
-    return best
-
-
-def _clearness(logs: Sequence[Log], outputs: Sequence[str]) -> float:
-    """Return how clear the clearest effect of an output along heave is."""
-    return fit.most if (fit := _fit(logs, HEAVE, outputs)) else 0.0
+    heave, nothing = VehicleAxis(HEAVE), frozenset[Axis]()
+    vertical = (Moved(nothing, {name: {HEAVE: 1.0}}).thrusters[name] for name in outputs)
+    layouts = (Layout((heave,), (), (thruster,)) for thruster in vertical)
+    tried = ([piece for log in logs for piece in without_rests(log, layout)] for layout in layouts)
+    possible = [[*logs], *(pieces for pieces in tried if pieces != [*logs])]
+    return max(possible, key=lambda own: fit.most if (fit := _fit(own, HEAVE, outputs)) else 0.0)
 
 
 def _fit(logs: Sequence[Log], axis: Axis, outputs: Sequence[str]) -> "_Fit | None":
