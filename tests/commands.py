@@ -18,6 +18,7 @@ import pytest
 from rov_fmu.cli import _commands, main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 
+Capsys = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parent.parent
 REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"

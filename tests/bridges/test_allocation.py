@@ -14,18 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.allocation import allocation_files
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.cli import main
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import BARE, ROOT
+from tests.commands import BARE, ROOT, Capsys
 from tests.vehicles import FINNED, a_vehicle
 
-Array = NDArray[np.float64]
 VEHICLES = {
     **SHIPPED,
     "six_axes": ROOT / "tests" / "vehicle" / "six_axes.toml",
@@ -144,9 +142,7 @@ def test_the_table_has_the_rows_of_the_yaml_and_both_rise(tmp_path: Path) -> Non
             assert (np.diff(table["command"]) > 0.0).all()
 
 
-def test_a_vehicle_whose_thrusters_cannot_be_commanded_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_vehicle_whose_thrusters_cannot_be_commanded_is_one_line(tmp_path: Path, capsys: Capsys) -> None:
     text, without = BARE.read_text(encoding="utf-8"), tmp_path / "without.toml"
     without.write_text(text[: text.index("[curves")] + text[text.index("[axes") :], encoding="utf-8")
     for path, reason in (

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp
-from numpy.typing import NDArray
 
 from rov_fmu.bridges.jacobian import step_jacobian
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.thrust.test_thrust_effects import NOW, ROV
 from tests.vehicles import SIX, VEHICLES, VIDEORAY, at_rest, random_inputs, random_state, still
 from verification.references import reference
 
 SWIFT = VEHICLES["lag without coupling"].with_(T_t200=0.001)
-Array = NDArray[np.float64]
 ALL = {**VEHICLES, "six_coupled": SIX, "a very short lag": SWIFT}
 H = 0.5
 

@@ -18,7 +18,6 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.gym import RovVectorEnv
@@ -31,6 +30,7 @@ from rov_fmu.interface.arguments import with_axes
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import InputError
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.commands import BARE, ROOT, python
@@ -40,7 +40,6 @@ from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 
 mujoco: Any = importlib.import_module("rov_fmu.bridges.mujoco.plugin").mujoco
-Array = NDArray[np.float64]
 REFERENCES = ROOT / "verification" / "references" / "vehicles"
 FILES = {
     **SHIPPED,

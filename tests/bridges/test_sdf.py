@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 from lxml import etree
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.bridges.sdf import gazebo_model
@@ -25,14 +24,14 @@ from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import cross_of
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import sealed
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
-from tests.commands import BARE, ROOT
+from tests.commands import BARE, ROOT, Capsys
 from tests.often import spread
 from tests.vehicles import VEHICLES, extended, pulsed
 from verification.references.rigid_body import coriolis, quaternion_of, rigid_body_mass, rotation, skew
 
-Array = NDArray[np.float64]
 REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
 EVERYTHING = ROOT / "tests" / "vehicle" / "everything.toml"
 FILES = {**SHIPPED, "remus100": REMUS, "everything": EVERYTHING, "bare": BARE}
@@ -423,7 +422,7 @@ def test_what_gazebo_cannot_have_is_one_line(vehicle: Vehicle, line: str) -> Non
 
 
 def test_the_command_writes_the_file_and_lists_the_notes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     model, explicit = gazebo_model(LOADED["bluerov2"]), gazebo_model(LOADED["bluerov2"], in_world=True, explicit=True)

@@ -32,7 +32,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import START, ArduSub, packet, parsed, started
 from tests.bridges.test_mcap import messages
-from tests.commands import ROOT
+from tests.commands import ROOT, Capsys
 from tests.tank.logs import commanded, used
 from tests.vehicles import numbered, pulsed, thruster
 
@@ -351,7 +351,7 @@ def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[in
     [("bluerov2", 0.0, 2.0), ("bluerov2", -5.5, 7.5), ("bluerov2", 5.0, 0.0), ("bluerov2_heavy", -4.0, 3.0)],
 )
 def test_how_far_a_vehicle_rises_before_ardusub_knows_its_position(
-    name: str, setting: float, newtons: float, capsys: pytest.CaptureFixture[str]
+    name: str, setting: float, newtons: float, capsys: Capsys
 ) -> None:
     """By SciPy: (m + m_a) w' = F - b_d w - a_d |w| w, with the numbers of the vehicle file."""
     rov = load_vehicle(SHIPPED[name])
@@ -368,7 +368,7 @@ def test_how_far_a_vehicle_rises_before_ardusub_knows_its_position(
     assert [[*map(float, found)] for found in said] == ([expected] if newtons else [])
 
 
-def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: Capsys) -> None:
     for vehicle, is_told in (("bluerov2", True), ("bluerov2_heavy", False), ("videoray", False)):
         assert main(["sitl", vehicle, "--duration", "0.01", "--port", "0"]) == 0
         assert ("ATC_RAT_RLL_I 0" in capsys.readouterr().err) == is_told, vehicle
@@ -499,9 +499,7 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
     assert np.ptp(commanded(one, "3")) > 0.4
 
 
-def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(tmp_path: Path, capsys: Capsys) -> None:
     log = tmp_path / "dive.csv"
     options = ["--frame", "simplerov_3", "--servo", "16=-t", "--duration", "0.2", "--port", "0", "--log", str(log)]
     assert main(["sitl", "videoray", *options]) == 0
@@ -546,7 +544,7 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
         (quote(f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}"), "VEHICLE: none of ArduSub's frames"),
     ],
 )
-def test_bad_options_are_one_line(options: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_options_are_one_line(options: str, said: str, capsys: Capsys) -> None:
     assert main(["sitl", *split(options)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"rov-fmu: {said}")

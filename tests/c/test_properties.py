@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.c.stepper import LaneStepper, Stepper
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -40,7 +39,6 @@ from tests.vehicles import (
     with_rotors,
 )
 
-Array = NDArray[np.float64]
 SCALE = 1e-12
 """The allowed difference, relative to the largest size of a variable of a vehicle, which is at least 1 in SI units."""
 VEHICLES = 19

@@ -10,17 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
 from tests.fmi2 import Fmu
 from tests.often import spread
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, random_inputs, random_state
-
-Array = NDArray[np.float64]
 
 
 def in_fmu(folder: Path, rov: Vehicle, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:

@@ -14,7 +14,7 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.cli.test_targets import bound_by_permissions
-from tests.commands import TESTS, run_elsewhere, without_progress
+from tests.commands import TESTS, Capsys, run_elsewhere, without_progress
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 
@@ -152,7 +152,7 @@ def test_what_is_no_file_is_one_line_that_names_it(
     what: Callable[[Path, pytest.MonkeyPatch], None],
     copied: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capsys,
 ) -> None:
     name, _ = READING[case]
     what(copied / name, monkeypatch)

@@ -13,9 +13,7 @@ import pytest
 from rov_fmu import InputError, prove_fmu, run_study
 from rov_fmu.cli import _commands, main
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import ALONE, BARE, TESTS
-
-Capsys = pytest.CaptureFixture[str]
+from tests.commands import ALONE, BARE, TESTS, Capsys
 
 
 def refusal(arguments: list[str], capsys: Capsys) -> str:

@@ -17,9 +17,8 @@ from rov_fmu.fmu.archive import FOLDER, MANIFEST, META_DATA
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.prove.proof import prove_fmu
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE
+from tests.commands import ALONE, Capsys
 
-Capsys = pytest.CaptureFixture[str]
 Change = Callable[[bytes], bytes]
 Files = Mapping[str, str | None]
 """Texts of files by their name in the FMU, or beside the manifest; None leaves a file out."""

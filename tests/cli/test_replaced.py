@@ -11,12 +11,9 @@ from rov_fmu.build import build_fmu
 from rov_fmu.cli import _commands, main
 from rov_fmu.io.output import Output, WriteError, check_targets, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, FILES, READING, WRITING, without_progress
+from tests.commands import BARE, FILES, READING, WRITING, Capsys, without_progress
 from tests.conftest import without_page
 from tests.often import spread
-
-Capsys = pytest.CaptureFixture[str]
-
 
 FOREIGN = "has no mark of rov-fmu: it may have been made or changed by hand"
 CHANGED = "has changed since rov-fmu wrote it"

@@ -18,11 +18,10 @@ from rov_fmu.interface.simulate_command import read_settings
 from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE
+from tests.commands import BARE, Capsys
 from tests.often import spread
 from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
 
-Capsys = pytest.CaptureFixture[str]
 COMMANDS = "time [s],u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
 
 

@@ -18,11 +18,9 @@ from rov_fmu.c.compile import PLATFORMS, host_platform
 from rov_fmu.cli import _Command, _commands, main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import BARE, ROOT, python, without_progress
+from tests.commands import BARE, ROOT, Capsys, python, without_progress
 from tests.conftest import without_page
 from tests.often import spread
-
-Capsys = pytest.CaptureFixture[str]
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 

@@ -24,7 +24,7 @@ from rov_fmu.cli import _commands, main
 from rov_fmu.equation.catalogue import ARM, AXIS, BODY, CURVE, TUNING
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import ROOT
+from tests.commands import ROOT, Capsys
 from tests.docs.test_notebooks import NOTEBOOKS
 from tests.often import spread
 from tests.vehicles import SIX, VEHICLES, tied
@@ -246,7 +246,7 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 @pytest.mark.filterwarnings("default:.*commands saturate")
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
 def test_programs_print_what_is_said(
-    page: Path, workplace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: Path, workplace: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     """They run in this process, which has imported most of what they need.
 

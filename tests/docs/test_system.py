@@ -31,7 +31,7 @@ from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.bridges.system.fmus import undescribed_build
-from tests.commands import ROOT
+from tests.commands import ROOT, Capsys
 from tests.conftest import Made, without_page
 
 SETS = tuple(parameter_sets())
@@ -135,9 +135,7 @@ def test_engines_hold_and_agree(engine: str, folder: Path, expected: tuple[str, 
 
 
 @pytest.mark.interop
-def test_the_command_runs_and_judges(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_runs_and_judges(tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run.main([str(tmp_path / "system")]) == 0
     told = capsys.readouterr().out
     assert told.count(" ok\n") >= 4
@@ -257,7 +255,7 @@ def test_the_picture_of_a_tether_shows_it(tmp_path: Path) -> None:
     assert "Tension" in (tmp_path / "tether.svg").read_text(encoding="utf-8")
 
 
-def test_the_controller_of_the_page_holds_the_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_controller_of_the_page_holds_the_depth(tmp_path: Path, capsys: Capsys) -> None:
     text = (ROOT / "docs" / "autopilot.md").read_text(encoding="utf-8")
     hold, controller = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (plan,) = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

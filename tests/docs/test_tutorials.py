@@ -22,7 +22,7 @@ from rov_fmu.identify.result import Identification, IdentifiedEffect, coverage_o
 from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import REFIT, ROOT
+from tests.commands import REFIT, ROOT, Capsys
 from tests.docs.test_docs import STOPPING, run, runnable
 from tests.vehicles import at_rest, still
 
@@ -164,7 +164,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
 
 
 @pytest.mark.long
-def test_a_learned_policy_and_the_autopilot_hold_station_as_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_learned_policy_and_the_autopilot_hold_station_as_the_page_says(capsys: Capsys) -> None:
     hold_station.main()
     policy, autopilot = map(float, re.findall(r"-\d+\.\d", capsys.readouterr().out))
     assert (policy, autopilot) == pytest.approx((-30.3, -101.8), abs=0.5)

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.often import spread
 from tests.vehicles import SIX, frictionless, still
 from verification.references import rigid_vehicle
 
-Array = NDArray[np.float64]
 TUMBLING = {"u": 0.4, "v": -0.6, "w": 0.3, "p": 1.7, "q": -1.1, "r": 2.3, "x": 5.0, "y": -3.0, "z": 2.0}
 TUMBLING |= {"eta": 0.1, "epsilon_1": -0.7, "epsilon_2": 0.5, "epsilon_3": 0.5}  # of length 1
 LENGTHS = pytest.mark.parametrize("h", spread([1e-3, 0.1, 10.0], [10.0], [1e-3]))

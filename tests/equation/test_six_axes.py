@@ -6,9 +6,9 @@ from math import pi
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -26,7 +26,6 @@ from tests.vehicles import (
 from verification.references import rigid_vehicle
 from verification.references.rigid_vehicle import compared, places
 
-Array = NDArray[np.float64]
 HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n) if {"p", "q"} & {*axes}]
 """The sets of axes with roll or pitch."""

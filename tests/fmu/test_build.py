@@ -15,7 +15,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import META_DATA
 from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import BARE, python
+from tests.commands import BARE, Capsys, python
 from tests.conftest import compile_anew
 
 
@@ -62,7 +62,7 @@ def test_by_default_an_fmu_has_all_platforms_of_64_bits() -> None:
 
 @pytest.mark.usefixtures("without_page")
 def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     def compiled(
         platforms: Sequence[str], _: object, __: str, done: Callable[[str], None], ___: int
@@ -95,7 +95,7 @@ def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
     either_fmu: Path,
     fmi: int,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capsys,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(fmu_compile._Library, "compile", compile_anew)

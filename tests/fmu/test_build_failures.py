@@ -14,7 +14,7 @@ import pytest
 
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
-from tests.commands import BARE, ROOT, endless_compiler
+from tests.commands import BARE, ROOT, Capsys, endless_compiler
 from tests.often import spread
 
 _SCRIPT = str(ROOT / "build_fmu.py")
@@ -38,7 +38,7 @@ def _untouched(old: Path) -> bool:
     return old.read_bytes() == _OLD and list(old.parent.iterdir()) == [old]
 
 
-def _one_line(capsys: pytest.CaptureFixture[str]) -> str:
+def _one_line(capsys: Capsys) -> str:
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1, lines
     return lines[0]
@@ -52,7 +52,7 @@ def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("without_page", "uncompiled")
 def test_an_fmu_that_is_not_valid_does_not_replace_the_old_one(
-    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     def invalid(_path: str) -> list[str]:
         return ["something is wrong with it"]
@@ -72,7 +72,7 @@ def test_an_fmu_that_is_not_valid_does_not_replace_the_old_one(
 
 @pytest.mark.usefixtures("without_page")
 def test_a_compile_error_is_printed_with_the_compilers_message(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     broken = tmp_path / "c"
     shutil.copytree(fmu_compile.C_SOURCES, broken)
@@ -88,7 +88,7 @@ def test_a_compile_error_is_printed_with_the_compilers_message(
 @pytest.mark.usefixtures("without_page", "uncompiled")
 @pytest.mark.parametrize(("owner", "function"), [(os, "fsync"), (Path, "replace")], ids=["fsync", "replace"])
 def test_a_full_disk_leaves_the_old_fmu(
-    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], owner: object, function: str
+    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys, owner: object, function: str
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

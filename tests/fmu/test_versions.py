@@ -12,7 +12,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE, PYTHON_NOTE, model_description, model_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import BARE
+from tests.commands import BARE, Capsys
 from tests.fmi import CO_SIMULATION, INTERFACES, MODEL_EXCHANGE
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.vehicles import HEAVY, THRUST_EFFECTS, a_vehicle
@@ -66,7 +66,7 @@ def test_the_description_has_the_elements_of_the_interface_and_its_own_guid(fmi:
 @pytest.mark.parametrize("interface", KINDS)
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_an_fmu_of_one_interface_runs_proves_itself_and_refuses_the_other(
-    fmi: int, interface: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fmi: int, interface: str, tmp_path: Path, capsys: Capsys
 ) -> None:
     path, folder = tmp_path / "bare.fmu", tmp_path / "bare"
     options = ["--fmi", str(fmi), "--interface", interface, "--platform", "host", "-o", str(path)]
@@ -90,7 +90,7 @@ def test_an_fmu_of_one_interface_runs_proves_itself_and_refuses_the_other(
 
 
 def test_an_interface_that_an_fmu_cannot_have_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for options, line in (

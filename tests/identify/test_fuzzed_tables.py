@@ -15,12 +15,11 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
-from tests.commands import TESTS, without_progress
+from tests.commands import TESTS, Capsys, without_progress
 from tests.damage import changed_bytes, changed_cells, changed_course, changed_lines, changed_toml, fuzz
 from tests.often import often, spread
 from tests.recordings import run, write_log
 
-Capsys = pytest.CaptureFixture[str]
 LOG = "log_heave_a.csv"
 
 

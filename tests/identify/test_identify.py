@@ -20,7 +20,7 @@ from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification, coverage_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import REFIT, without_progress
+from tests.commands import REFIT, Capsys, without_progress
 from tests.folders import BLUEROV2, DOWN, FORCE, HEAD, SPEED, folder_of, read, responses
 from tests.identify.conftest import FORCES, KNOWN, Identified, add_voltage
 from tests.often import spread
@@ -383,7 +383,7 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("seed", spread(range(6), (), [0, 1]))
 def test_a_log_that_has_nothing_to_do_with_its_commands_must_not_be_used(
-    seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    seed: int, tmp_path: Path, capsys: Capsys
 ) -> None:
     """Beside exact measurements, rounding decides whether motions that no sensor measures diverge; the fit ends."""
     names, random = ",".join(f"u_{n} [1]" for n in range(1, 7)), np.random.default_rng(seed)
@@ -433,7 +433,7 @@ TABLES = {**FORCES, **responses(TRUTH, HEAVE)}
     ],
 )
 def test_a_folder_that_cannot_be_used_is_one_line(
-    rov: str, tables: Mapping[str, str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    rov: str, tables: Mapping[str, str], words: str, tmp_path: Path, capsys: Capsys
 ) -> None:
     folder, out = folder_of(tmp_path / "tests", rov, tables), tmp_path / "rov.toml"
     code = main(["identify", str(folder), "-o", str(out)])

@@ -20,6 +20,7 @@ from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
+from tests.commands import Capsys
 from tests.vehicles import extended, pulsed, thruster
 
 k = load_vehicle(VIDEORAY)
@@ -33,7 +34,7 @@ def tuned_to(k: Vehicle, axis: Axis, command: float, V_ss: float, Tau: float | N
     return tune(k, axis, points).vehicle
 
 
-def test_the_printout_names_the_inputs_that_are_held(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_printout_names_the_inputs_that_are_held(capsys: Capsys) -> None:
     """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
     points = [Target("V_ss", command, sign * 0.5) for command, sign in ((0.3, 1), (-0.4, -1))]
     print_tuning(tune(k, YAW, points))
@@ -80,9 +81,7 @@ def test_intervals_are_those_of_linear_regression() -> None:
         (0.3, 0.2, 1e-9, "beta_w"),
     ],
 )
-def test_what_no_tuning_gives(
-    command: float, V_ss: float, Tau: float, named: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_no_tuning_gives(command: float, V_ss: float, Tau: float, named: str, capsys: Capsys) -> None:
     check_refused([f"--command={command}", f"--v-ss={V_ss}", f"--tau={Tau}"], named, capsys)
 
 
@@ -191,7 +190,7 @@ def test_a_speed_at_which_the_thrust_is_lost_is_refused(sign: float) -> None:
 # ---- rov-fmu tune ----------------------------------------------------------------------------------------------------
 
 
-def check_refused(options: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
+def check_refused(options: list[str], named: str, capsys: Capsys) -> None:
     assert main(["tune", str(VIDEORAY), "--axis", "heave", *options]) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -199,7 +198,7 @@ def check_refused(options: list[str], named: str, capsys: pytest.CaptureFixture[
     assert named in err
 
 
-def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path, capsys: Capsys) -> None:
     assert main(["tune", str(VIDEORAY), *HEAVE_AT_30]) == 0
     assert re.search(r"^alpha_w = 1\.140(.|\n)*^beta_w = 0\.58998", capsys.readouterr().out, re.M)
     output = tmp_path / "tuned.toml"
@@ -250,7 +249,7 @@ def test_a_tuned_copy_of_an_identified_vehicle_says_so(tmp_path: Path) -> None:
     assert trust not in card(load_vehicle(SHIPPED["videoray_refit"]))["How far to trust it"]
 
 
-def test_points_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_of_a_file(tmp_path: Path, capsys: Capsys) -> None:
     points = tmp_path / "points.csv"
     points.write_text(
         "command [%],velocity [cm/s],time constant [s]\n20,11.24490,3.210526\n30,17.49804,\n70,,0.980904\n",
@@ -279,7 +278,7 @@ def test_points_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     ],
 )
 def test_wrong_options_and_points_are_one_line(
-    options: list[str], content: str, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    options: list[str], content: str, named: str, tmp_path: Path, capsys: Capsys
 ) -> None:
     points = tmp_path / "points.csv"
     points.write_text(f"command [%],{content}", encoding="utf-8")

@@ -10,10 +10,9 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import read_toml
-from tests.commands import BARE, TESTS, without_progress
+from tests.commands import BARE, TESTS, Capsys, without_progress
 from tests.often import often
 
-Capsys = pytest.CaptureFixture[str]
 SECONDS_PER_MISTAKE = 4e-4
 """A limit for the processor time, ten times what is needed. If every mistake had a line, it would take 9e-4 s."""
 

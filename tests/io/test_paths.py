@@ -10,9 +10,8 @@ from rov_fmu.cli import main
 from rov_fmu.io.paths import MODELS, inside_or_shipped, name_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE, BARE, TESTS
+from tests.commands import ALONE, BARE, TESTS, Capsys
 
-Capsys = pytest.CaptureFixture[str]
 NOT_RELATIVE = "must be a relative path with / between its parts"
 OUTSIDE = "must lead to a place inside the folder of this file"
 # Names that a file must not contain, as TOML writes them, and the message about each. The folder above the file has the

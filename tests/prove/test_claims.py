@@ -24,11 +24,10 @@ from rov_fmu.prove.proof import _deviation
 from rov_fmu.prove.subject import Subject, opened
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import make_key
+from tests.commands import Capsys, make_key
 from verification.references.vehicles import IDENTIFIED
 
 Texts = Mapping[str, str]
-Capsys = pytest.CaptureFixture[str]
 Measure = Callable[[Subject], Evidence]
 
 

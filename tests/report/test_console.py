@@ -18,6 +18,7 @@ from rov_fmu.report.console_log import _drawn
 from rov_fmu.report.progress import Display, Parts, StudyParts, StudyProgress, compiling, parts
 from rov_fmu.report.templates import number, number_text, panel_title, pretty_unit, sentence
 from rov_fmu.tank.inspection.inspection import Signal
+from tests.commands import Capsys
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -45,7 +46,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     assert "two" in text, "a header of two lines"
 
 
-def test_messages_and_ends_escape_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+def test_messages_and_ends_escape_control_characters(capsys: Capsys) -> None:
     print_message(f"rov-fmu: warning: {FOREIGN}")
     print_end({Path(FOREIGN): ""}, FOREIGN)
 
@@ -134,7 +135,7 @@ def of_study(done: int, *, failed: int = 0, has_workers: bool = True) -> StudyPr
     return StudyProgress(done, 12_000, failed, "http://localhost", has_workers)
 
 
-def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: Capsys) -> None:
     display = Display()
     shown = Parts(display)
     assert shown.is_shown
@@ -175,9 +176,7 @@ def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.Monk
     assert shown._running["runs"].left is not None
 
 
-def test_a_pipe_gets_a_line_again_and_again(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pipe_gets_a_line_again_and_again(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
     """Also where the work tells no progress, and of a study that is continued."""
     monkeypatch.setattr("rov_fmu.report.progress._EVERY", 0.05)
     now = [5.0]
@@ -202,7 +201,7 @@ def test_a_pipe_gets_a_line_again_and_again(
 
 
 def test_what_is_left_becomes_smaller_until_the_next_step_is_done(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     """A quarter is done after 10 s, so 30 s are left. A step that takes longer leaves something to the end."""
     now, left = [0.0], []
@@ -220,7 +219,7 @@ def test_what_is_left_becomes_smaller_until_the_next_step_is_done(
     assert seconds[4] == 10
 
 
-def test_an_answer_takes_the_place_of_the_one_before(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_answer_takes_the_place_of_the_one_before(capsys: Capsys) -> None:
     """In a pipe, each has a line."""
     answers = ["heave 0.5 m/s at 50%, fits the depth to 9 cm", "heave 0.46 m/s at 50%, fits the depth to 2 cm"]
     out = io.StringIO()
@@ -233,7 +232,7 @@ def test_an_answer_takes_the_place_of_the_one_before(capsys: pytest.CaptureFixtu
     assert re.findall("so far: .*", out.getvalue()) == [f"so far: {answers[-1]}"]
 
 
-def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: Capsys) -> None:
     for platforms in (["linux"], ["linux", "windows"]):
         with compiling() as (begin, done):
             begin(platforms)

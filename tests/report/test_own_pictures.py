@@ -19,7 +19,6 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.conftest import Visit
 from tests.report.pages import UNFOLD
 
-Capsys = pytest.CaptureFixture[str]
 _OPEN = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 200 100"'
 _FULL = '<rect width="200" height="100" fill="#c43e12"/>'
 _OWN = "document.title='owned'"

@@ -17,7 +17,7 @@ from rov_fmu.vehicle.description import StatedSpeed
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.steady import speed_table, steady_at
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import BARE
+from tests.commands import BARE, Capsys
 from tests.often import spread
 from tests.vehicles import VEHICLES
 
@@ -84,7 +84,7 @@ def test_what_is_no_speed_or_no_load_is_refused(arguments: tuple[Any, ...], reas
     assert reason in str(error.value)
 
 
-def test_a_speed_that_no_command_gives_is_refused_with_the_largest_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_speed_that_no_command_gives_is_refused_with_the_largest_one(capsys: Capsys) -> None:
     largest = rov_fmu.load("bluerov2").response("surge", -1.0)[0]
     assert main(["simulate", "bluerov2", "--find", "surge=-3"]) == 2
     assert f"surge reaches {largest:.3f} m/s at -100%" in capsys.readouterr().err
@@ -116,20 +116,20 @@ def test_the_table_ends_with_the_strongest_tested_command(name: str) -> None:
         ("--find surge=1 --input log.csv", "--find simulates nothing: leave --input out"),
     ],
 )
-def test_what_cannot_be_found_gives_one_line(arguments: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_found_gives_one_line(arguments: str, reason: str, capsys: Capsys) -> None:
     assert main(["simulate", "videoray", *arguments.split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert reason in line
 
 
-def test_the_command_prints_what_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_what_is_found(capsys: Capsys) -> None:
     assert main(["simulate", "bluerov2", "--find", "surge=1"]) == 0
     said = capsys.readouterr().out
     assert re.search(r"^surge +1 m/s +0\.3158 +22\.21 N +86\.91 W$", said, re.MULTILINE)
     assert said.endswith("Next: rov-fmu simulate bluerov2 --set surge=0.3158\n")
 
 
-def test_the_vehicles_that_ship_are_listed_with_their_descriptions(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_vehicles_that_ship_are_listed_with_their_descriptions(capsys: Capsys) -> None:
     assert main(["list"]) == 0
     said = capsys.readouterr().out
     for name in SHIPPED:
@@ -138,7 +138,7 @@ def test_the_vehicles_that_ship_are_listed_with_their_descriptions(capsys: pytes
 
 @pytest.mark.parametrize("share", spread([0.5, 0.92, 1.0, 1.08, 2.0], [0.5, 1.0], [1.08]))
 def test_another_top_speed_than_the_stated_one_is_told_where_it_is_flown(
-    share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    share: float, tmp_path: Path, capsys: Capsys
 ) -> None:
     rov = rov_fmu.load("videoray")
     reached = rov.response("surge", 1.0)[0]
@@ -173,9 +173,7 @@ def test_another_top_speed_than_the_stated_one_is_told_where_it_is_flown(
         ('surge = { value = 0.0, unit = "m/s", source = "x" }', "surge.value = 0.0: must be"),
     ],
 )
-def test_a_stated_speed_that_cannot_be_gives_one_line(
-    stated: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_stated_speed_that_cannot_be_gives_one_line(stated: str, reason: str, tmp_path: Path, capsys: Capsys) -> None:
     path = tmp_path / "own.toml"
     path.write_text(f"{BARE.read_text(encoding='utf-8')}\n[validity.stated]\n{stated}\n", encoding="utf-8")
     assert main(["simulate", str(path), "--find", "surge=1"]) == 2

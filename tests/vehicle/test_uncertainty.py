@@ -19,7 +19,7 @@ from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import ALONE, FROZEN_REFIT
+from tests.commands import ALONE, FROZEN_REFIT, Capsys
 from tests.identify.scenarios.catalogue import USUAL
 from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
 from tests.often import spread
@@ -137,7 +137,7 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_a_bad_estimate_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_estimate_is_one_clear_line(case: str, tmp_path: Path, capsys: Capsys) -> None:
     change, words = BAD[case]
     path = tmp_path / "bad.toml"
     text = change(TEXT)

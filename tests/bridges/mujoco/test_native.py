@@ -13,15 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.mujoco import mujoco_files, mujoco_texts
 from rov_fmu.bridges.mujoco.source import water_sources
+from rov_fmu.tank.arrays import Array
 from tests.bridges.test_mujoco import loaded, mujoco, scene
 from tests.commands import BARE
-
-Array = NDArray[np.float64]
 
 
 def world(package: ModuleType) -> Any:

@@ -29,7 +29,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.system.fmus import foreign
-from tests.commands import without_progress
+from tests.commands import Capsys, without_progress
 from tests.vehicles import tied
 
 HERE = Path(__file__).parent
@@ -302,7 +302,7 @@ def test_a_battery_gives_at_most_the_power_at_half_of_its_voltage() -> None:
 # ---- A system that is run --------------------------------------------------------------------------------------------
 
 
-def test_a_run_writes_the_motion_and_a_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_writes_the_motion_and_a_plot(tmp_path: Path, capsys: Capsys) -> None:
     line = ["system", str(HERE / "current.toml"), "-o", str(tmp_path / "my.ssp"), "--run"]
     assert main(line) == 0
     assert "water: nothing" not in capsys.readouterr().err, "its input has a start value"
@@ -350,7 +350,7 @@ def test_a_stranger_may_number_its_outputs() -> None:
     assert ">y_p1<" in picture(structure, read, [], 1.0, np.arange(4.0)[:, None] + np.arange(len(read)))
 
 
-def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsys: Capsys) -> None:
     plan, rows = tmp_path / "plan.toml", tmp_path / "my.csv"
     parts = '[component.w]\ncompanion = "current"\nfile = "my.csv"\n[component.r]\nvehicle = "rov/bluerov2.toml"\n'
     plan.write_text(f"step = 1.0\nstop_time = 1.0\n{parts}", encoding="utf-8")
@@ -384,7 +384,7 @@ def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     assert half.words(names).startswith("half the step changes b.V_N by 8.8% of its range: the numbers of this step")
 
 
-def test_the_command_tells_what_half_the_step_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_tells_what_half_the_step_changes(tmp_path: Path, capsys: Capsys) -> None:
     """Two waters, V = 1 - z, of which each is as deep as the other one was fast: they swing with every step."""
     water = 'companion = "current"\nstart = { speed = 1.0, exponent = 1.0, seabed = 1.0 }\n'
     connections = 'connect = [["a.V_N", "b.z", 0.9], ["b.V_N", "a.z", 0.5]]\n'
@@ -411,9 +411,7 @@ STRANGE = {
 
 
 @pytest.mark.parametrize("kind", STRANGE)
-def test_what_an_fmu_says_or_does_is_told_with_its_name_and_the_time(
-    kind: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_an_fmu_says_or_does_is_told_with_its_name_and_the_time(kind: int, tmp_path: Path, capsys: Capsys) -> None:
     FmuBuilder.build_FMU(HERE / "strange.py", dest=tmp_path)
     plan = tmp_path / "plan.toml"
     start, plain = f'fmu = "Strange.fmu"\nstart = {{ kind = {kind} }}\n', '[component.b]\nfmu = "Strange.fmu"\n'
@@ -423,7 +421,7 @@ def test_what_an_fmu_says_or_does_is_told_with_its_name_and_the_time(
     assert capsys.readouterr().err.count(message) == 1
 
 
-def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys: Capsys) -> None:
     (tmp_path / "dead.fmu").write_bytes(foreign())  # it has no binary
     plan = tmp_path / "plan.toml"
     plan.write_text('step = 1.0\nstop_time = 1.0\n[component.a]\nfmu = "dead.fmu"\n', encoding="utf-8")

@@ -22,7 +22,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.bridges.system.fmus import described, foreign, undescribed_build
-from tests.commands import ROOT, without_progress
+from tests.commands import ROOT, Capsys, without_progress
 from tests.often import spread
 from tests.vehicles import in_waves
 
@@ -83,7 +83,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         Path(f"{name}.fmu").write_bytes(content)
 
 
-def told(text: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+def told(text: str, capsys: Capsys) -> list[str]:
     """Write a plan, run the command, and return the lines of its error."""
     Path("plan.toml").write_text(text, encoding="utf-8")
     before = sorted(Path().iterdir())
@@ -169,9 +169,7 @@ WRONG = {
 
 @pytest.mark.parametrize("case", spread(WRONG, [*WRONG][::2], WRONG))
 @pytest.mark.usefixtures("folder")
-def test_what_does_not_fit_is_one_line(
-    case: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_does_not_fit_is_one_line(case: str, capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(system, "build_fmu")  # nothing is compiled for a plan that does not fit
     old, new, message = WRONG[case]
     assert old in PLAN
@@ -184,16 +182,14 @@ def test_what_does_not_fit_is_one_line(
 
 
 @pytest.mark.usefixtures("folder")
-def test_every_mistake_is_told_at_once(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_mistake_is_told_at_once(capsys: Capsys) -> None:
     text = PLAN.replace(LAST, '["x.y", "b.u"], ["a.y", "y.u"],').replace("length = 20.0", "lenght = 20.0")
     keys = [line.split(": ")[2].split(" = ")[0] for line in told(text, capsys)]
     assert keys == ["component.tether.start.lenght", "connect#5", "connect#6"]
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_package_that_is_missing_is_one_line(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_that_is_missing_is_one_line(capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(companions, "find_spec", lambda _: None)
     (line,) = told(PLAN, capsys)
     assert line.endswith("component.tether.companion = 'tether': needs moordyn: pip install 'rov-fmu[system]'")
@@ -202,7 +198,7 @@ def test_a_package_that_is_missing_is_one_line(
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_port_that_is_forgotten_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_that_is_forgotten_is_told(capsys: Capsys) -> None:
     lines = [line for line in PLAN.replace(LAST, "").splitlines() if "point_" not in line]
     Path("plan.toml").write_text("\n".join(lines), encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
@@ -293,7 +289,7 @@ companion = "current"
 
 @pytest.mark.usefixtures("folder")
 def test_a_sea_serves_vehicles_with_their_own_currents_and_every_node_of_a_tether(
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capsys,
 ) -> None:
     Path("rov.toml").write_text(vehicle_text(in_waves(load_vehicle(VIDEORAY))))
     Path("plan.toml").write_text(SEA)
@@ -322,7 +318,7 @@ def test_a_sea_serves_vehicles_with_their_own_currents_and_every_node_of_a_tethe
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_plan_becomes_a_system(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plan_becomes_a_system(capsys: Capsys) -> None:
     Path("plan.toml").write_text(PLAN.replace(LAST, '["a.y", "b.u", 2.0],'), encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
     printed = capsys.readouterr()
@@ -421,7 +417,7 @@ def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     assert part.direct == {}, "outputs change with a step"
 
 
-def test_the_list_names_every_companion_with_its_variables(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_names_every_companion_with_its_variables(capsys: Capsys) -> None:
     assert main(["system", "--list"]) == 0
     printed = capsys.readouterr().out
     assert "autopilot: holds the vehicle of `for`" in printed
@@ -431,7 +427,7 @@ def test_the_list_names_every_companion_with_its_variables(capsys: pytest.Captur
 
 
 @pytest.mark.usefixtures("folder")
-def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_plan_of_a_stranger_is_bounded(capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     many = "\n".join(f'[component.c{n}]\nfmu = "foreign.fmu"' for n in range(101))
     (line,) = told(f"step = 1.0\nstop_time = 1.0\n{many}", capsys)
     assert "component" in line
@@ -463,7 +459,7 @@ def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str], m
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_an_autopilot_belongs_to_a_vehicle(table: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_autopilot_belongs_to_a_vehicle(table: str, message: str, capsys: Capsys) -> None:
     others = {"rov": 'vehicle = "videoray"', "water": 'companion = "current"', "fins": 'vehicle = "remus100.toml"'}
     text = "".join(f"[component.{name}]\n{lines}\n" for name, lines in {**others, "pilot": table}.items())
     Path("remus100.toml").write_bytes((ROOT / "examples" / "remus100" / "remus100.toml").read_bytes())

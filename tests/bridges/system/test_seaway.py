@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.bridges.system.companion import slave_of
 from rov_fmu.bridges.system.companions.seaway import VARIABLES, Seaway
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.cli import main
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from rov_fmu.vehicle.writer import vehicle_text
-from tests.commands import ROOT
+from tests.commands import ROOT, Capsys
 from tests.vehicles import a_vehicle, in_waves, passed, tied
 
-Array = NDArray[np.float64]
 G = 9.80665
 HEAVY, BLUEROV2, VIDEORAY = (load_vehicle(SHIPPED[name]) for name in ("bluerov2_heavy", "bluerov2", "videoray"))
 OUTPUTS = ("V_N", "V_E", "V_D", "A_N", "A_E", "A_D", "elevation")
@@ -258,7 +257,7 @@ def test_a_sea_that_cannot_be_is_refused(name: str, value: float) -> None:
 
 
 def test_a_vehicle_that_the_current_passes_is_refused_in_a_sea(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It would lose the load of the waves, (m + M_A) A."""
     monkeypatch.chdir(tmp_path)
@@ -294,7 +293,7 @@ def test_a_tether_is_moved_by_the_sea_of_a_plan(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_a_held_vehicle_keeps_station_up_to_the_sea_of_the_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     plan, _ = re.findall(r"^```toml\n(.*?)^```", (ROOT / "docs" / "waves.md").read_text("utf-8"), re.M | re.S)

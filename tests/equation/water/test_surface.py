@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.words import LEFT_WATER
@@ -23,7 +22,6 @@ from verification.references import rigid_body
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body, compared, places
 
-Array = NDArray[np.float64]
 G = 9.80665
 BLUEROV2 = without_surface(load_vehicle(SHIPPED["bluerov2"]))
 LEVEL, TILTED = surfaced(BLUEROV2, 0.25), surfaced(SIX, 0.3)

@@ -31,13 +31,12 @@ from rov_fmu.prove.signature import check_signature
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import BARE, make_key
+from tests.commands import BARE, Capsys, make_key
 from tests.conftest import Made, without_page
 from tests.often import often, spread
 from tests.prove.test_properties import flipped
 from tests.vehicles import THRUST_EFFECTS
 
-Capsys = pytest.CaptureFixture[str]
 _REFIT = SHIPPED["videoray_refit"]
 
 

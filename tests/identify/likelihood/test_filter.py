@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.c.compile import C_SOURCES, FILTER_LANES_FILE, VECTORS_HEADER, compile_engine
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axes_alone
@@ -24,7 +23,6 @@ from tests.identify.likelihood.sets import one_set
 from tests.vehicles import VIDEORAY, extended
 from verification.references.kalman import Belief, Sample, run
 
-Array = NDArray[np.float64]
 DEPTH, VELOCITY = Sensor(HEAVE, is_velocity=False), Sensor(HEAVE, is_velocity=True)
 INPUTS = [*VIDEORAY.layout.inputs]
 """The inputs of the VideoRay; the first is the command to port."""

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
@@ -20,8 +19,8 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import StructureFit, settled
 from rov_fmu.identify.likelihood.solve import evidence, least_from, start_of
+from rov_fmu.tank.arrays import Array
 
-Array = NDArray[np.float64]
 RAW, SECONDS = 20, 40.0
 """Samples of the sensors in a second, and how long a dive lasts, s."""
 QUADRATIC, LINEAR, INERTIA = np.array([50.0, 1.6]), np.array([8.0, 0.4]), np.array([30.0, 0.5])
