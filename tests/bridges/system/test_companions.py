@@ -341,6 +341,15 @@ def test_a_plot_has_a_panel_for_each_quantity_and_few_lines_in_it() -> None:
     assert all(f">{name.partition('.')[2]}<" in drawn for name in chosen)
 
 
+def test_a_length_is_a_place_if_a_terminal_has_it_as_one(videoray_fmu: Path) -> None:
+    """The elevation of a sea is none."""
+    sea = SystemFmu.open(Path("sea"), companion("seaway"), is_ours=True)
+    structure = SystemStructure({"rov": SystemFmu.open(videoray_fmu), "sea": sea}, {}, [])
+    rows = np.arange(4.0)[:, None] + np.arange(2)
+    drawn = picture(structure, [("rov", "z"), ("sea", "elevation")], ["rov.z", "sea.elevation"], 1.0, rows)
+    assert re.findall(r"font-weight:700[^>]*>([^<]+)<", drawn) == ["Place of rov (m)", "Sea (m)"]
+
+
 def test_a_stranger_may_number_its_outputs() -> None:
     """Nodes and levels are members of terminals; another output whose name ends like theirs is drawn and compared."""
     parts = {name: SystemFmu.open(Path(name), foreign(output="y_p1")) for name in ("a", "b")}
