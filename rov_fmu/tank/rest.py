@@ -215,8 +215,7 @@ def _shares(
     acting = [sliding_window_view(one, size) @ (weights / weights.sum()) for one in (np.diff(ends) / _STEP, *others)]
     gap = np.diff(times, prepend=times[0])[np.minimum(np.searchsorted(times, time), len(times) - 1)]
     known = (gap < _HALF * _STEP)[_HALF:-_HALF]
-    slowing = [-rate * np.abs(rate), -rate, *(np.abs(rate) * one for one in acting[1:3] if len(others) > 1)]
-    causes = np.column_stack([*acting, *slowing])
+    causes = np.column_stack([*acting, -rate * np.abs(rate), -rate])
     _, large = usual_range(np.abs(rate))
     if np.sum(moving := known & (np.abs(rate) > _MOVES * large)) < _LEAST_STEPS:
         return given, share, drag
@@ -229,7 +228,7 @@ def _shares(
         weight = 1.0 / np.maximum(errors / noise, 0.5)
     spread = np.linalg.pinv((some * weight[:, None]).T @ some) * size * weight.mean()  # neighbours share their samples
     error = noise * np.sqrt(1.0 + np.einsum("ni,ij,nj->n", causes, spread, causes))
-    push, slowed = causes[:, : len(acting)] @ found[: len(acting)], causes[:, len(acting) :] @ found[len(acting) :]
+    push, slowed = causes[:, :-2] @ found[:-2], causes[:, -2:] @ found[-2:]
     given[_HALF:-_HALF] = push
     is_told = known & (np.abs(push) > _SIGNIFICANT * error)
     share[_HALF:-_HALF][is_told] = ((acceleration - slowed) / push)[is_told]
