@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
-from time import process_time
 
 import numpy as np
 
@@ -50,8 +49,9 @@ _STARTS = ("start 1", "start 2")
 """The kinds of the parameters say where they begin: with much noise, J has few minima far from the data."""
 _UNREFINED = 4
 """The most steps on all samples of a fit that nobody should use."""
-_PATIENCE = 60.0
-"""The processor time after which no more causes are tried for a model that is wrong along all axes, s."""
+_PATIENCE, _BEFORE = 5e6, 4
+"""After so many fits times samples and parameters, no more causes are tried for a model that is wrong along all axes: a
+minute on a usual machine. The fits before the search are about as long as four of its own."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -135,7 +135,6 @@ def fit_all(
     the reason, and not the structure. Such a fit is not refined, because nobody should use it. Neither is a fit that is
     clearly wrong along all axes: after _PATIENCE, the search for its cause ends with the round.
     """
-    began = process_time()
     work = work or ProgressReport()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends = _from_starts(quick, work)
@@ -149,7 +148,8 @@ def fit_all(
     plain, first = (plain, dict[Suspect, float]()) if is_mistake else settled(plain)
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), work.steps("hypotheses")
-    search = StructureSearch(plain, lambda: show_tried(next(tried)), lambda: process_time() - began > _PATIENCE)
+    size = len(full.table.parameters) * sum(len(one.time) for one in full.records)
+    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size - _BEFORE)
     if not is_mistake:
         search.run()
     full, near = search.now.objective, search.now.minimum

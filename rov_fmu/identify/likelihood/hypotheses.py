@@ -81,8 +81,6 @@ class Hypothesis:
     """True if it changes what samples are, which would mislead all others. So it is tried before these."""
     leaves_out: bool = False
     """True if it leaves out velocities, which makes any model better: it has to explain the errors of the others."""
-    is_last: bool = False
-    """True if its fits take long, so that it is tried after all others: where these explain more, it is given up."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
     frees: tuple[str, ...] = ()
@@ -496,7 +494,6 @@ HYPOTHESES = {
         "all thrusters: commands act as ramps, which take {value} from rest to full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
         least=KINDS[LAG].mean + PRIORS[LAG].deviation,  # a shorter ramp is rather a usual lag
-        is_last=True,
     ),
 }
 """All hypotheses about the structure, by the kind of their parameter, in the order in which they change a model: first

@@ -569,11 +569,11 @@ class StructureSearch:
         self,
         plain: StructureFit,
         on_fit: Callable[[], None] = lambda: None,
-        is_late: Callable[[], bool] = lambda: False,
+        most: float = inf,
     ) -> None:
-        """`plain` is the fit without hypotheses; `on_fit` is called before each other fit, and `is_late` tells whether
-        the search has taken long enough for a model that is wrong along all axes."""
-        self.plain, self.on_fit, self.is_late = plain, on_fit, is_late
+        """`plain` is the fit without hypotheses; `on_fit` is called before each other fit. A search for what is wrong
+        with a model along all axes ends after `most` fits."""
+        self.plain, self.on_fit, self.most = plain, on_fit, most
         self.has_ended = False
         """True if it was late, and nothing had explained the errors along any axis in a round."""
         self.now = plain
@@ -602,7 +602,7 @@ class StructureSearch:
     def _search(self, rounds: Iterable[int]) -> None:
         """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
         for number in rounds:
-            self.has_ended = number > 0 and self.now.is_hopeless and self.is_late()
+            self.has_ended = number > 0 and self._is_over
             if self.has_ended:
                 break
             fits = self._round()
@@ -610,6 +610,12 @@ class StructureSearch:
             if self._gain(best) <= 0.0:
                 break
             self.now = self._with_needed(best)
+
+    @property
+    def _is_over(self) -> bool:
+        """True if a model that nobody could use has taken enough fits. They are counted and not timed, because the
+        result must not depend on the machine."""
+        return len(self.tried) > self.most and self.now.is_hopeless
 
     @property
     def odds(self) -> dict[Suspect, float]:
@@ -732,11 +738,11 @@ class StructureSearch:
         If one set has won by far, sets whose J falls much less before any fit wait for the next round.
         """
         fits, won = list[StructureFit](), -inf
-        for starts, gain in sorted(self._promising(), key=lambda one: any(HYPOTHESES[k].is_last for k, _ in one[0])):
+        for starts, gain in sorted(self._promising(), key=lambda one: self._rows(one[0])):
             if gain < won - _FAR:
                 continue
             # What explains a model that is wrong along all axes is far better, also on few samples.
-            rise = _FAR if self.now.is_hopeless and self.is_late() else -WINS
+            rise = _FAR if self._is_over else -WINS
             enough = max(one.quick for one in (self.now, *fits)) + rise
             self.on_fit()
             fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)
@@ -750,6 +756,10 @@ class StructureSearch:
                 if fit.score > self.now.score + _FAR:
                     won = max(won, gain)
         return fits
+
+    def _rows(self, starts: Starts) -> int:
+        """Return the number of rows of commands. Fits with many take long, and end where others explain more."""
+        return sum(len(one.record.told) for one in applied(self.plain.objective, starts, thinned=True).logs)
 
     def _promising(self) -> Iterator[tuple[Starts, float]]:
         """Yield the sets that are worth a fit, with the fall of J that tells so before any fit.

@@ -951,7 +951,7 @@ def test_a_search_ends_when_it_is_late_and_the_model_is_wrong_along_all_axes(
         "rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {SURGE: Misfit(9.0), YAW: Misfit(yaw)}
     )
     monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
-    search = StructureSearch(fit(None, None, {}), is_late=lambda: is_late)
+    search = StructureSearch(fit(None, None, {}), most=1 if is_late else 9)
     search.suspects, search.apart = {SLEW: (1.0,), ROTORS: (None,)}, {}
     monkeypatch.setattr(search, "_ranked", lambda sets: [(some, 1.0) for some in sets])
     search.run()
