@@ -413,7 +413,8 @@ def _with_cure(identification: Identification) -> tuple[AxisResult, ...]:
     bent = {thruster.curve for thruster in layout.thrusters_along(YAW)}
 
     def is_bent(one: AxisResult) -> bool:
-        is_other = one.slips or one.misfits or any(not d.changes_thrust for d in one.unknown)
+        is_pushed = any(d.share > MOST_UNKNOWN and not d.changes_thrust for d in one.unknown)
+        is_other = one.slips or one.misfits or is_pushed
         return one.axis is YAW or not (is_other or bent.isdisjoint(t.curve for t in layout.thrusters_along(one.axis)))
 
     return tuple(
