@@ -11,6 +11,8 @@ from time import perf_counter
 import numpy as np
 
 from rov_fmu.c.compile import (
+    BACKENDS,
+    FMI_VERSIONS,
     INTERFACES,
     OTHER_NAMES,
     PLATFORMS,
@@ -25,7 +27,6 @@ from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import FmuContent, native_content, python_content, web_module
 from rov_fmu.fmu.meta_data import meta_data
-from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmus.fmu import Fmu
@@ -39,7 +40,6 @@ from rov_fmu.prove.signature import check_private_key, check_signature, signatur
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
-BACKENDS = ("native", "pythonfmu")
 _RUN, _STEPS = 10.0, 100
 """The length of the run of a new FMU, s, and its steps."""
 

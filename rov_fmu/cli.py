@@ -17,7 +17,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.c.compile import INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.c.compile import BACKENDS, FMI_VERSIONS, INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import (
     FileError,
@@ -222,14 +222,14 @@ def _commands(context: click.Context) -> None:
 )
 @click.option(
     "--backend",
-    type=_Choice(["native", "pythonfmu"], {"python": "pythonfmu", "c": "native"}),
+    type=_Choice(BACKENDS, {"python": "pythonfmu", "c": "native"}),
     default="native",
     show_default=True,
     help="Compiled C, or Python with PythonFMU (FMI 2.0 only).",
 )
 @click.option(
     "--fmi",
-    type=_Choice([2, 3], {"2.0": "2", "3.0": "3"}),
+    type=_Choice(FMI_VERSIONS, {"2.0": "2", "3.0": "3"}),
     default=2,
     show_default=True,
     help="Version of FMI.",

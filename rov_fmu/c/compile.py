@@ -118,6 +118,8 @@ PLATFORMS: dict[str, Platform] = {
     "aarch64-darwin": Platform("aarch64-darwin", ".dylib", _APPLE_SILICON, _MACOS),
 }
 
+BACKENDS = ("native", "pythonfmu")
+FMI_VERSIONS = (2, 3)
 INTERFACES = {
     "cs": ("CoSimulation",),
     "me": ("ModelExchange",),

@@ -13,7 +13,6 @@ from rov_fmu.fmu.variables import LOG_CATEGORIES, DeclaredVariable, FmuModel, va
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
-FMI_VERSIONS = (2, 3)
 PYTHON_NOTE = (
     "Needs a Python on this machine. On Linux an importer that is not itself a Python process must be started with "
     "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
