@@ -149,7 +149,7 @@ def fit_all(
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), work.steps("hypotheses")
     size = len(full.table.parameters) * sum(len(one.time) for one in full.records)
-    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size - _BEFORE)
+    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / max(size, 1) - _BEFORE)
     if not is_mistake:
         search.run()
     full, near = search.now.objective, search.now.minimum
