@@ -50,8 +50,8 @@ _STARTS = ("start 1", "start 2")
 _UNREFINED = 4
 """The most steps on all samples of a fit that nobody should use."""
 _PATIENCE, _BEFORE = 5e6, 4
-"""After so many fits times samples and parameters, no more causes are tried for a model that is wrong along all axes: a
-minute on a usual machine. The fits before the search are about as long as four of its own."""
+"""After so many fits times samples, also those of tables, and parameters, no more causes are tried for a model that is
+wrong along all axes: a minute on a usual machine. The fits before the search are about as long as four of its own."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -148,8 +148,8 @@ def fit_all(
     plain, first = (plain, dict[Suspect, float]()) if is_mistake else settled(plain)
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), work.steps("hypotheses")
-    size = len(full.table.parameters) * sum(len(one.time) for one in full.records)
-    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / max(size, 1) - _BEFORE)
+    size = len(near.z) * sum(len(one.innovations) for one in near.data)
+    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size - _BEFORE)
     if not is_mistake:
         search.run()
     full, near = search.now.objective, search.now.minimum

@@ -40,8 +40,7 @@ _UP = 0.5
 _WITH_SAME, _SLOW = 3, 0.3
 """The most steps with the same derivatives, and the share of their reduction of J that another one must be worth."""
 _STALLED = 2
-"""A search ends when new derivatives reduce J by too little so often in turn: at a kink they may fail by chance. Once
-is enough for a fit to the end that another one follows."""
+"""A search ends when new derivatives reduce J by too little so often in turn: at a kink they may fail by chance."""
 _REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
 """The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
 step from which the next one has new derivatives."""
@@ -96,7 +95,7 @@ def _minimised(
 
     All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The first
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
-    less than `enough`, the second time exact ones; once, if another fit follows one to the end. It ends early if
+    less than `enough`, the second time exact ones. It ends early if
     `promises` returns False. This gets the minimum within reach, and the reduction of J by the derivatives before,
     which is infinite at first. Data and information of a `last` fit have exact derivatives: those of the step before if
     J hardly fell, and otherwise others, after one more step with them, unless motions beside the minimum diverge. Those
@@ -124,7 +123,7 @@ def _minimised(
         now = _descended(objective, now)
         gain = before.value - now.value
         stalled = stalled + 1 if gain < enough else 0
-        if stalled == (_STALLED if last or enough > ENOUGH else 1):
+        if stalled == _STALLED:
             break
     if last and not (stalled == _STALLED and gain < ENOUGH):
         try:
