@@ -67,7 +67,8 @@ def thrust_rows(vehicle: Vehicle, curve: Curve, voltage: float | None, exact: fl
     """Return the forces and commands of one thruster, both rising, from full reverse to full ahead.
 
     Where the force does not rise with the command, the smaller command stands, and it is 0 for no force. Between two
-    rows, the command is linear in the force, with a relative error of the force of at most `exact`.
+    rows, the command is linear in the force. At the samples, the error of the force is at most `exact`, relative to the
+    force or to a small one where it is smaller. Between two samples, it may be a third larger.
     """
     ahead, astern = (list(_one_way(vehicle, curve, voltage, sign, exact)) for sign in (1.0, -1.0))
     return [*((-force, -c) for force, c in reversed(astern)), (0.0, 0.0), *ahead]

@@ -237,7 +237,7 @@ def _shares(
 
 
 def _moved_by_hand(told: Array, at: int, side: int) -> int:
-    """Return until when a vehicle that left a deck without a push is lowered by hand or by a crane: until the vertical
-    command changes. With -1 for `side`, since when it is lifted."""
+    """Return until when a vehicle that left a deck is lowered by hand or by a crane: until its command changes.
+    With -1 for `side`, since when it is lifted."""
     changes = np.flatnonzero(told[at::side] != told[at])
     return at + side * int(changes[0]) if len(changes) else at

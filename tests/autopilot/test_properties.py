@@ -165,7 +165,7 @@ def test_a_hold_does_not_depend_on_where_north_is(angle: float) -> None:
         start |= {"eta": cos(0.5 * (0.4 + angle)), "epsilon_3": sin(0.5 * (0.4 + angle))}
         aims = np.tile([*aim, 10.0, 0.0, 0.0, 0.6 + angle], (100, 1))
         flight = Flights(HEAVY, made.sharing, [start]).fly(made.loops, np.full((100, 6), PLACE), aims, made.step)
-        return flight.demands[0]
+        return np.asarray(flight.demands[0])
 
     assert demands(angle) == pytest.approx(demands(0.0), abs=1e-6)
 

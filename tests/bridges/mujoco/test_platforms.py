@@ -11,7 +11,7 @@ import pytest
 
 from rov_fmu.bridges.mujoco.source import water_sources
 from rov_fmu.c.compile import PLATFORMS, compile_engine
-from tests.bridges.mujoco.test_native import Array
+from rov_fmu.tank.arrays import Array
 from tests.bridges.test_mujoco import loaded
 from tests.fmu.test_binaries import MACHINES
 from verification.references.c_programs import compile_c, run_program
