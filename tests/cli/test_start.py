@@ -33,7 +33,7 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
-    monkeypatch.setattr("rov_fmu.build.reference_results", lambda _: {})
+    monkeypatch.setattr("rov_fmu.build.reference_results", lambda *_, **__: {})
     assert main(["build", name, "--backend", "pythonfmu"]) == 0
     assert capsys.readouterr().out.startswith(f"{name}-python.fmu: ")
     assert [path.name for path in tmp_path.iterdir()] == [f"{name}-python.fmu"]

@@ -42,6 +42,7 @@ from rov_fmu.identify.likelihood.solve import (
     REST,
     Minimum,
     evidence,
+    louder,
     minimise,
     scaled,
     start_of,
@@ -490,16 +491,16 @@ def fitted(
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise is at
-    least that of a rough vehicle: that of a wrong model explains what the right one would. If a motion diverges from
-    there, all begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is
-    below `enough`: a fit that will not come there is given up.
+    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise begins
+    as in a first fit: that of a wrong model explains what the right one would. If a motion diverges from there, all
+    begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below
+    `enough`: a fit that will not come there is given up.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
     if any(HYPOTHESES[kind].changes_thrust for kind, _ in starts.keys() ^ near.starts.keys()):
-        there = np.where(thinned.table.each("of_motion"), there, np.maximum(there, rough(thinned.table)))
+        there = louder(thinned, there)
 
     def promises(end: Minimum, gain: float) -> bool:
         return evidence(thinned, end) + REST * gain > enough
