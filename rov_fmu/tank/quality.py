@@ -1,15 +1,15 @@
 """What is told about the channels of a log: their sources, sensors that froze, jumps, gaps, and its pieces."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import MOST, first_of, listed
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, Indices
 from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Commands, Log
@@ -31,6 +31,8 @@ _ANOTHER = ". What follows counts as another log"
 _FASTER = 5.0
 """A quantity jumps where it changes this many times as fast as around there, by this many usual steps, and stays there:
 its median over three samples changes by half of the jump or more."""
+_AROUND_JUMP = np.array([[-2, -1, 0], [1, 2, 3]])
+"""The three samples before and after a jump, from the sample before it."""
 _FASTER_VELOCITY = 2.0
 """How many times as fast as 95 % of the time a velocity changes where it jumps, because thrusters change it quickly.
 Other quantities change _FASTER times as fast."""
@@ -44,7 +46,7 @@ def checked_log(log: Log) -> Log:
     findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
-    findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
+    findings += [_jumps(log.file, one) for one in _resets(used)]
     findings += source_findings(log.file, channels)
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
@@ -104,7 +106,7 @@ def uninterrupted(log: Log) -> list[Log]:
     told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
     silent = gaps(told, told)
     interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))
-    resets = {pair for channel in log.channels if _divides(channel) for pair in _resets(channel)}
+    resets = {pair for one in _resets(log.channels) if one.divides for pair in one.times}
     return without_spans(log, sorted({*silent, *resets}), [interruption] if silent else [])
 
 
@@ -144,57 +146,99 @@ def gaps_in_words(found: Sequence[tuple[float, float]], begin: float) -> str:
     return ", ".join(first_of([f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in found], MOST))
 
 
-def _resets(channel: Channel) -> list[tuple[float, float]]:
-    """Return the times before and after each jump of a position, s."""
-    if channel.unused or channel.quantity.unit not in ("m", "rad"):
-        return []
-    time, values = channel.unwrapped
-    return [(float(time[n]), float(time[n + 1])) for n in jumps(time, values)]
+@dataclass(frozen=True)
+class _Resets:
+    """The jumps of a position or of an attitude, as by resets of a filter or of a sensor."""
+
+    channels: Sequence[Channel]
+    """One, or the angles of an attitude."""
+    times: Sequence[tuple[float, float]]
+    """Before and after each jump, s."""
+    sizes: Sequence[float]
+    """m or rad. That of an attitude is the angle by which it turns."""
+
+    @property
+    def divides(self) -> bool:
+        """True for a depth and for angles, whose resets divide a log. Those of other positions may come often."""
+        axis = self.channels[0].quantity.axis
+        return axis is not None and (axis is HEAVE or axis.is_rotation)
 
 
-def _divides(channel: Channel) -> bool:
-    """Return True for a depth or an angle, whose resets divide a log. Those of other positions may come often."""
-    axis = channel.quantity.axis
-    return axis is not None and (axis is HEAVE or axis.is_rotation)
+def _resets(channels: Sequence[Channel]) -> Iterator[_Resets]:
+    """Yield the jumps of each position that jumps.
+
+    Angles that are measured at the same times are one attitude, because roll and heading change by half a turn where
+    the bow passes through the vertical, although the vehicle hardly turns.
+    """
+    groups: dict[tuple[str, bytes], list[Channel]] = {}
+    for channel in channels:
+        if not channel.unused and channel.quantity.unit in ("m", "rad"):
+            name = channel.quantity.unit if channel.quantity.unit == "rad" else channel.quantity.name
+            groups.setdefault((name, channel.samples[0].tobytes()), []).append(channel)
+    for group in groups.values():
+        time, values = group[0].unwrapped
+        path: Array | Rotation = values
+        if len(group) > 1 and len(time):
+            angles = {channel.quantity.axis: channel.samples[1] for channel in group}
+            ordered = [angles.get(axis, np.zeros(len(time))) for axis in (YAW, PITCH, ROLL)]
+            path = Rotation.from_euler("ZYX", np.column_stack(ordered))
+        at = jumps(time, path)
+        if len(at):
+            steps = _steps(path, at, at + 1)
+            sizes = np.linalg.norm(steps, axis=-1) if isinstance(path, Rotation) else steps[:, 0]
+            yield _Resets(group, [*zip(time[at].tolist(), time[at + 1].tolist(), strict=True)], sizes.tolist())
 
 
-def _jumps(file: str, channel: Channel) -> Finding | None:
-    """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
-    if not (resets := _resets(channel)):
-        return None
+def _jumps(file: str, resets: _Resets) -> Finding:
+    """Return a finding about the jumps of a position or of an attitude."""
+    channel, *others = resets.channels
     axis, (factor, unit) = channel.quantity.axis, in_degrees(channel.quantity.unit)
-    steps = factor * np.diff(np.interp(resets, *channel.unwrapped)).ravel()
+    sign = "" if others else "+"
     told = [
-        f"{step:+.3g} {unit} at {end - channel.time[0]:.4g} s" for step, (_, end) in zip(steps, resets, strict=True)
+        f"{factor * size:{sign}.3g} {unit} at {end - channel.time[0]:.4g} s"
+        for size, (_, end) in zip(resets.sizes, resets.times, strict=True)
     ]
-    words = ", ".join(first_of(told, MOST)) + _ANOTHER * _divides(channel)
-    name = axis.name if axis else ""
-    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(resets))
+    words = ", ".join(first_of(told, MOST)) + _ANOTHER * resets.divides
+    quantity, name = ("attitude", "") if others else (channel.quantity.name, axis.name if axis else "")
+    return about(file, "jumps", name, quantity=quantity, jumps=words, count=len(resets.times))
 
 
-def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[np.intp]:
+def jumps(time: Array, path: Array | Rotation, *, is_velocity: bool = False) -> Indices:
     """Return the indices of the samples after which a quantity jumps, as by a reset of a filter or of a sensor.
 
-    `values` are in m, rad or m/s, without jumps of a full turn. A velocity jumps by what differs from the acceleration
-    around it, which may be as large where a command changes.
+    `path` is in m, rad or m/s, without jumps of a full turn, or it has attitudes. A velocity jumps by what differs from
+    the acceleration around it, which may be as large where a command changes.
     """
     from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
 
-    steps = np.diff(values)
-    if len(values) < LEAST_SAMPLES or not steps.any():
+    every = np.arange(len(time))
+    steps = _steps(path, every[:-1], every[1:]) if len(time) else np.zeros((0, 1))
+    if len(time) < LEAST_SAMPLES or not steps.any():
         return np.zeros(0, np.intp)
-    rates = steps / np.diff(time)
-    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(np.abs(rates), 0.95)
-    least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
+    intervals = np.diff(time)
+    sizes = np.linalg.norm(steps, axis=-1)
+    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(sizes / intervals, 0.95)
+    least = max(_LEAST_JUMP, _FASTER * float(np.median(sizes[sizes != 0.0])))
     if is_velocity:
-        rates = rates - median_filter(rates, _AROUND, mode="nearest")
-        steps = rates * np.diff(time)
-        values = np.append(0.0, np.cumsum(steps))
-    rates = np.abs(rates)
+        rates = steps[:, 0] / intervals
+        path = np.append(0.0, np.cumsum((rates - median_filter(rates, _AROUND, mode="nearest")) * intervals))
+        sizes = np.abs(np.diff(path))
+    rates = sizes / intervals
     beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
-    sudden = (np.abs(steps) > least) & (rates > np.maximum(beside, usual))
-    around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
-    return np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
+    sudden: Indices = np.flatnonzero((sizes > least) & (rates > np.maximum(beside, usual)))
+    around = np.clip(sudden[:, None, None] + _AROUND_JUMP, 0, len(time) - 1)
+    before, after = np.moveaxis(np.median(_steps(path, sudden[:, None, None], around), axis=2), 1, 0)
+    stays = np.linalg.norm(after - before, axis=-1) > 0.5 * sizes[sudden]
+    return np.asarray(sudden[stays])
+
+
+def _steps(path: Array | Rotation, start: Indices, end: Indices) -> Array:
+    """Return what is between some samples of a path: ... x 1 differences, or ... x 3 rotation vectors, rad."""
+    if not isinstance(path, Rotation):
+        return np.asarray((path[end] - path[start])[..., None])
+    start, end = np.broadcast_arrays(start, end)
+    turns = path[start.ravel()].inv() * path[end.ravel()]
+    return np.asarray(turns.as_rotvec().reshape(*end.shape, 3))
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
@@ -165,6 +166,32 @@ def test_a_log_is_divided_where_its_depth_is_reset() -> None:
     assert used(second, "depth").time[0] == pytest.approx(5.0)
     along = log(down, channel("surge distance", TIME, jumped))
     assert uninterrupted(along) == [along]
+
+
+@pytest.mark.parametrize("least", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize(("turned", "at"), [(0.0, 0), (30.0, 60), (-25.0, 20)])
+def test_an_attitude_jumps_by_its_rotation_also_where_the_bow_is_vertical(turned: float, at: int, least: float) -> None:
+    """A vehicle that pitches over passes the vertical as closely as `least`, degrees, where roll and heading change by
+    half a turn. The first reset is there, the second one elsewhere."""
+    noise = Rotation.from_rotvec(0.003 * np.random.default_rng(5).standard_normal((len(TIME), 3)))
+    pitching = Rotation.from_euler("ZYX", np.column_stack([0.4 + 0.0 * TIME, 0.5 * (TIME - 3.0), 0.0 * TIME]))
+    tilted = Rotation.from_euler("X", np.radians(least))
+    reset = Rotation.from_rotvec(np.outer(np.arange(len(TIME)) > at, [0.0, 0.0, np.radians(turned)]))
+    yaw, pitch, roll = (reset * tilted * pitching * noise).as_euler("ZYX").T
+    assert np.abs(np.diff(np.unwrap(yaw))).max() > 0.4
+    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
+    angles = {"roll angle": roll, "pitch angle": pitch, "heading": yaw % (2.0 * np.pi)}
+    whole = log(down, *(channel(name, TIME, values) for name, values in angles.items()))
+    told = [one.words["jumps"] for one in checked_log(whole).findings]
+    pieces = uninterrupted(checked_log(whole))
+    if not turned:
+        assert (told, len(pieces)) == ([], 1)
+    else:
+        (words,) = told
+        size, _, _, time, *_ = str(words).split()
+        assert float(size) == pytest.approx(abs(turned), abs=3.0)
+        assert float(time) == pytest.approx(TIME[at + 1])
+        assert len(pieces) == 2
 
 
 @pytest.mark.parametrize(("jump", "at"), [(0.8, [160]), (-0.8, [160]), (0.0, [])])
