@@ -79,8 +79,6 @@ of the others."""
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
 _SURE = 0.99
-_LATER = 1.0
-"""A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
 _OWN: Mapping[Heading, Mapping[str, str]] = {
@@ -765,7 +763,7 @@ def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     kind = "explained disturbance" if d.cause else d.slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
     where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
-    since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
+    since = "" if d.since is None else f" from {d.since:.0f} s on"
     remedy = _REMEDIES.get(d.cause, "")
     return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since, cause=d.cause, remedy=remedy)
 

@@ -314,7 +314,8 @@ class Disturbance(IdentifiedEffect):
     share: float
     """The value relative to the RMS of the thrust, or of the velocity, in that log."""
     since: float | None = None
-    """From when on it exceeds twice its own uncertainty, s after the start of the log; None if it comes and goes."""
+    """From when on it exceeds twice its own uncertainty, s after the start of the log; None if it does so from the
+    start, or comes and goes."""
     cause: str = ""
     """The channel that explains it in words, such as `the voltage`; empty if none does."""
 

@@ -424,6 +424,7 @@ def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ())
     parts = [log if log.commands else _on_clock(log, commands, is_other=log.file in other_clock) for log in logs]
     return replace(
         commanding[0],
+        start=min(log.begin for log in parts),
         channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
@@ -444,6 +445,7 @@ def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     kind = "other clock" if overlap else "aligned clock"
     return replace(
         log,
+        start=log.begin + moved,
         channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
         findings=(*log.findings, about(log.file, kind)),
     )

@@ -194,6 +194,16 @@ class Log:
     """The frame of ArduSub that the log tells, such as `vectored`; empty where it tells none."""
     names: frozenset[str] = frozenset()
     """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
+    start: float | None = None
+    """The time of the log's clock at which its file begins, s; None: with the first command or measurement."""
+
+    @cached_property
+    def begin(self) -> float:
+        """The time of the log's clock, s, from which all times that are told count: also those of a piece of a file."""
+        if self.start is not None:
+            return self.start
+        firsts = [channel.time[0] for channel in self.channels if len(channel.time)]
+        return float(min([*self.commands.rows[:1], *firsts] if self.commands else firsts, default=0.0))
 
     @property
     def whole_file(self) -> str:

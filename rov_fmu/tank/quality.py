@@ -42,11 +42,11 @@ _AROUND = 5
 
 def checked_log(log: Log) -> Log:
     """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
-    channels, frozen = _without_frozen(log.file, log.channels)
+    channels, frozen = _without_frozen(log)
     findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
-    findings += [_jumps(log.file, one) for one in _resets(used)]
+    findings += [_jumps(log, one) for one in _resets(used)]
     findings += source_findings(log.file, channels)
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
@@ -105,7 +105,7 @@ def uninterrupted(log: Log) -> list[Log]:
     assert commands  # a folder keeps no other log
     told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
     silent = gaps(told, told)
-    interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))
+    interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, log.begin))
     resets = {pair for one in _resets(log.channels) if one.divides for pair in one.times}
     return without_spans(log, sorted({*silent, *resets}), [interruption] if silent else [])
 
@@ -119,7 +119,6 @@ def without_spans(
     assert commands
     if not spans:
         return [log]
-    first = min(float(commands.rows[0]), *(float(c.time[0]) for c in log.channels if len(c.time)))
     pieces = list[Log]()
     edges = [-np.inf, *(edge for span in spans for edge in span), np.inf]
     for start, end in zip(edges[::2], edges[1::2], strict=True):
@@ -132,10 +131,11 @@ def without_spans(
         if len(rows) and (not least or rows[-1] - rows[0] > least):
             piece = replace(
                 log,
-                file=f"{log.file} (from {start - first:.4g} s)" if start > -np.inf else log.file,
+                file=f"{log.whole_file} (from {start - log.begin:.4g} s)" if start > -np.inf else log.file,
                 commands=Commands.of_rows(commands.thrusters, rows, commands.at(rows), commands.source),
                 channels=tuple(channels),
                 findings=() if pieces else (*log.findings, *why),
+                start=log.begin,
             )
             pieces.append(piece)
     return pieces
@@ -189,18 +189,18 @@ def _resets(channels: Sequence[Channel]) -> Iterator[_Resets]:
             yield _Resets(group, [*zip(time[at].tolist(), time[at + 1].tolist(), strict=True)], sizes.tolist())
 
 
-def _jumps(file: str, resets: _Resets) -> Finding:
+def _jumps(log: Log, resets: _Resets) -> Finding:
     """Return a finding about the jumps of a position or of an attitude."""
     channel, *others = resets.channels
     axis, (factor, unit) = channel.quantity.axis, in_degrees(channel.quantity.unit)
     sign = "" if others else "+"
     told = [
-        f"{factor * size:{sign}.3g} {unit} at {end - channel.time[0]:.4g} s"
+        f"{factor * size:{sign}.3g} {unit} at {end - log.begin:.4g} s"
         for size, (_, end) in zip(resets.sizes, resets.times, strict=True)
     ]
     words = ", ".join(first_of(told, MOST)) + _ANOTHER * resets.divides
     quantity, name = ("attitude", "") if others else (channel.quantity.name, axis.name if axis else "")
-    return about(file, "jumps", name, quantity=quantity, jumps=words, count=len(resets.times))
+    return about(log.file, "jumps", name, quantity=quantity, jumps=words, count=len(resets.times))
 
 
 def jumps(time: Array, path: Array | Rotation, *, is_velocity: bool = False) -> Indices:
@@ -244,12 +244,12 @@ def _steps(path: Array | Rotation, start: Indices, end: Indices) -> Array:
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------
 
 
-def _without_frozen(file: str, channels: Sequence[Channel]) -> tuple[list[Channel], list[Finding]]:
+def _without_frozen(log: Log) -> tuple[list[Channel], list[Finding]]:
     """Return the channels without the values of sensors that froze together, and a finding about these.
 
     A single constant sensor may be right: for example the depth at the surface, or a coarse heading at rest.
     """
-    used = [channel for channel in channels if not channel.unused and len(channel.time)]
+    used = [channel for channel in log.channels if not channel.unused and len(channel.time)]
     first = min((float(channel.time[0]) for channel in used), default=0.0)
     last = max((float(channel.time[-1]) for channel in used), default=0.0)
     frozen = {channel: at for channel in used if (at := _frozen_from(channel, last - first)) is not None}
@@ -257,10 +257,10 @@ def _without_frozen(file: str, channels: Sequence[Channel]) -> tuple[list[Channe
     together = max(groups, key=len, default={})
     names = [channel.quantity.name for channel in together]
     if len({*names}) < 2:
-        return [*channels], []
-    kept = [replace(c, values=np.where(c.time < together.get(c, np.inf), c.values, np.nan)) for c in channels]
-    start = min(together.values()) - first
-    return kept, [about(file, "frozen sensors", sensors=listed(names), start=start, end=last - first)]
+        return [*log.channels], []
+    kept = [replace(c, values=np.where(c.time < together.get(c, np.inf), c.values, np.nan)) for c in log.channels]
+    start, end = min(together.values()) - log.begin, last - log.begin
+    return kept, [about(log.file, "frozen sensors", sensors=listed(names), start=start, end=end)]
 
 
 def _frozen_from(channel: Channel, duration: float) -> float | None:

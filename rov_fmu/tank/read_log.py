@@ -88,6 +88,7 @@ def _log(
         commanded = forces if forces.series else commanded
     without_thruster = (content.without_thruster if is_first else {}) or commanded.without_thruster
     config = piece.parameters.last("FRAME_CONFIG")
+    begin = min((float(topic.time.min()) for topic in piece.topics if len(topic.time)), default=0.0) - piece.since
     fields = [*labels.values()]
     source = commanded.sender or Source(" ... ".join(dict.fromkeys([*fields[:1], *fields[-1:]])))
     series = told or commanded.series
@@ -95,7 +96,7 @@ def _log(
         *content.findings * is_first,
         *not_measured,
         *commanded.findings,
-        *_findings(file, layout, series, labels),
+        *_findings(file, layout, series, labels, begin),
         *misfits(file, layout, commanded.without_pulse, without_thruster, config),
     ]
     channels = channels_of(
@@ -119,6 +120,7 @@ def _log(
         unread=unread,
         frame=frame_of(config),
         names=content.names or frozenset(piece.fields),
+        start=begin,
     )
 
 
@@ -170,17 +172,20 @@ def _check_bounds(path: Path, field: str, quantity: MeasuredQuantity, values: Ar
         raise DataFileError(f"{path}, column {shown(field)} = {beyond[0]:g} {quantity.unit}{count}: {allowed}")
 
 
-def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:
+def _findings(
+    file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str], begin: float
+) -> Iterator[Finding]:
     """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any,
     or without any at first.
 
-    `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
+    `labels` has the column or field of each input, thruster or axis that rov.toml or a table names, and the log begins
+    at `begin`, s.
     """
     first = min((time[0] for time, _ in series.values()), default=0.0)
     for name, (time, values) in series.items():
         title = labels.get(name, f"thruster {name}")
         if time[0] > first + LATE:
-            yield about(file, "late command", column=title, at=f"{time[0] - first:.4g}")
+            yield about(file, "late command", column=title, at=f"{time[0] - begin:.4g}")
         count = int((np.abs(values) > 1.0 + 1e-9).sum())
         if count and name not in EXTERNAL:
             yield about(file, "beyond full thrust", column=title, count=count)

@@ -79,9 +79,8 @@ def without_rests(log: Log, layout: Layout, height: float = USUAL_HEIGHT) -> lis
             spans.append((start, end))
             against.append({})
         against[-1][where] = None
-    first = float(log.commands.rows[0])
     words = [
-        f"from {start - first:.4g} to {end - first:.4g} s ({listed(where)})"
+        f"from {start - log.begin:.4g} to {end - log.begin:.4g} s ({listed(where)})"
         for (start, end), where in zip(spans, against, strict=True)
     ]
     left = sum(end - start for start, end in spans)

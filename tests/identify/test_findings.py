@@ -303,7 +303,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     (
         "velocity over ground",
-        disturbance("slow velocity", axis=None, since=0.9),
+        disturbance("slow velocity", axis=None, since=None),
         "surge: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
         None,
     ),

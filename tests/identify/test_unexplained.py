@@ -154,14 +154,15 @@ def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
 
 @pytest.mark.parametrize(
     ("start", "end", "since"),
-    [(13.7, 60.0, 13.7), (0.0, 60.0, 0.0), (60.0, 60.0, None), (20.0, 40.0, None)],
-    ids=["a load taken at 13.7 s", "always", "never", "it comes and goes"],
+    [(13.7, 60.0, 20.7), (0.0, 60.0, None), (0.5, 60.0, None), (60.0, 60.0, None), (20.0, 40.0, None)],
+    ids=["a load taken at 13.7 s", "always", "nearly always", "never", "it comes and goes"],
 )
 def test_a_disturbance_acts_from_when_it_stays(start: float, end: float, since: float | None) -> None:
-    """A path also exceeds twice its uncertainty, or falls below it, by chance: here for 0.3 s in each 4 s."""
+    """A path also exceeds twice its uncertainty, or falls below it, by chance: here for 0.3 s in each 4 s. The samples
+    are a piece of a log that began 7 s before."""
     time = np.arange(600) / 10.0
     by_chance = (time % 4.0 < 0.3) & (time > 2.0)
-    assert acting_since(time, ((time >= start) & (time < end)) ^ by_chance) == since
+    assert acting_since(time, ((time >= start) & (time < end)) ^ by_chance, -7.0) == since
 
 
 @pytest.mark.long

@@ -149,7 +149,7 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
     ids=["two", "the least", "of an angle", "too small", "an outlier", "a fast motion", "noise", "a coarse sensor"],
 )
 def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
-    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
+    down = commands(100.0 + TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
     quantity = "heading" if "heading" in told else "depth"
     found = checked_log(
         log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values))

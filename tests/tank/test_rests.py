@@ -13,7 +13,8 @@ import pytest
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.folder import read_folder
-from rov_fmu.tank.log import Log
+from rov_fmu.tank.log import Commands, Log
+from rov_fmu.tank.quality import uninterrupted
 from rov_fmu.tank.rest import without_rests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -225,6 +226,31 @@ def test_a_log_of_a_single_axis_and_one_that_only_rests_stay_as_they_are() -> No
     assert without_rests(dive, LAYOUT) == [dive]
     of_axis = replace(drawn(3, pushes_down, dives_to(7.0)), axis=HEAVE)
     assert without_rests(of_axis, LAYOUT) == [of_axis]
+
+
+def test_times_in_a_piece_of_a_log_count_from_where_the_log_begins() -> None:
+    """Also where a gap has divided the log before, and where its clock counts from elsewhere."""
+    dive = drawn(7, pushes_on, hand(0.0))
+    (rest,) = (one.words["rests"] for piece in without_rests(dive, LAYOUT) for one in piece.findings)
+    assert dive.commands
+    rows = dive.commands.rows
+    shown = [
+        replace(c, time=c.time + 1e6, values=c.values + np.where((c.time > 5.0) & (c.time < 8.0), np.nan, 0.0))
+        for c in dive.channels
+    ]
+    kept = (rows <= 5.0) | (rows >= 8.0)
+    told = Commands.of_rows(
+        dive.commands.thrusters, rows[kept] + 1e6, dive.commands.at(rows[kept]), dive.commands.source
+    )
+    pieces = [
+        own
+        for piece in uninterrupted(replace(dive, commands=told, channels=tuple(shown)))
+        for own in without_rests(piece, LAYOUT)
+    ]
+    assert [one.words["rests"] for piece in pieces for one in piece.findings if one.kind == "rests"] == [rest]
+    assert [piece.file for piece in pieces][:2] == ["a.csv", "a.csv (from 8 s)"]
+    assert [piece.begin for piece in pieces] == [1e6] * len(pieces)
+    assert [piece.whole_file for piece in pieces] == ["a.csv"] * len(pieces)
 
 
 def test_a_bottom_on_which_it_has_rested_is_left_out_at_each_short_touch() -> None:

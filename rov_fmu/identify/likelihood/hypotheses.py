@@ -235,17 +235,18 @@ def _of_lost(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
 
 
 def _of_settled(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
-    """Return each file with the time since its first row from which its velocities count."""
+    """Return each file with the time since the begin of the log from which its velocities count."""
     some = (one for one in logs if one.file in of)
-    return {"of": listed(f"{one.file} (until {one.settled - one.record.told[0]:.1f} s)" for one in some)}
+    return {"of": listed(f"{one.file} (until {one.settled - one.log.begin:.1f} s)" for one in some)}
 
 
 def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
-    """Return each file whose commands do not always act, with the times since its first row between which they do."""
+    """Return each file whose commands do not always act, with the times since its begin between which they do."""
     assert isinstance(start, tuple)
-    told, words = {one.file: one.record.told for one in logs}, []
+    some, words = {one.file: one for one in logs}, []
     for file, (begin, end) in zip(of, start, strict=True):
-        first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
+        ends = np.clip((begin, end), *some[file].record.told[[0, -1]]) - some[file].log.begin
+        first, last = (f"{float(at):.1f}" for at in ends)
         words.append(f"{file} ({first} to {last} s)")
     return {"of": listed(words)}
 

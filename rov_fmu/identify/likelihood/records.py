@@ -393,7 +393,7 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
         measured.setdefault(axis, file)
         slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
         if log.commands and (some := gaps(channel.time, channel.values)):
-            words = gaps_in_words(some, float(log.commands.rows[0]))
+            words = gaps_in_words(some, log.begin)
             findings.append(about(file, "gaps", axis.name, quantity=quantity, gaps=words, count=len(some)))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [about(measured[axis], kind, axis.name) for axis, kind in kinds.items()]

@@ -22,6 +22,8 @@ _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
 _PARTED = 0.9
 """A slow process acts from some time on if at least this share of the samples shows nothing before, and it after."""
+_LATER = 1.0
+"""A slow process that is seen before this time, s, is taken to act from the start."""
 _STEPS = 8
 """The most derivatives of a fit without a slow process."""
 
@@ -130,16 +132,18 @@ def _disturbance(
         axis=axis,
         file=sampled.file,
         share=size / usual,
-        since=acting_since(time, clear),
+        since=acting_since(time, clear, sampled.log.begin),
     )
 
 
-def acting_since(time: Array, clear: Flags) -> float | None:
-    """Return from when on a slow process acts, s after the first of n samples; None if it comes and goes.
+def acting_since(time: Array, clear: Flags, begin: float) -> float | None:
+    """Return from when on a slow process acts, s after the begin of the log; None if it acts from the first of n
+    samples on, or comes and goes.
 
     `clear` is true where it exceeds twice its own uncertainty, which it does now and then by chance. So the time counts
     that parts the samples best into those without it and those with it.
     """
     right = np.append(0, np.cumsum(~clear)) + np.append(np.cumsum(clear[::-1])[::-1], 0)
     first = int(np.argmax(right))
-    return float(time[first] - time[0]) if first < len(time) and right[first] >= _PARTED * len(time) else None
+    is_parted = first < len(time) and right[first] >= _PARTED * len(time)
+    return float(time[first] - begin) if is_parted and time[first] - time[0] >= _LATER else None
