@@ -22,7 +22,6 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
         "turning",
         "fmi3SetFloat64",
         "RK4",
-        "memory of each",
         "A study by two workers",
         "MuJoCo with the plug-in",
     )

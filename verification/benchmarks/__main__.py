@@ -17,7 +17,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 
-from . import kalman, picture, runs, simulators, taylor
+from . import picture, runs, simulators, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import Steps
@@ -31,7 +31,6 @@ class Effort:
     commands: int = 16384
     known: int = 64  # commands whose results are compared with 50 digits; with few, RK4 looks more exact than it is
     manoeuvres: int = 5  # repetitions of what Python steps
-    runs: int = 100_000
     study_runs: tuple[int, ...] = (1000, 10_000, 100_000)
 
 
@@ -40,7 +39,7 @@ A cell's second number is the error at the end of a held command against 50 digi
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
-_QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, study_runs=(100, 400))
+_QUICK = Effort(3, 1024, manoeuvres=1, study_runs=(100, 400))
 
 
 @click.command(help=__doc__)
@@ -71,13 +70,11 @@ def _deep(name: str) -> Vehicle:
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
     say = Console(stderr=True).status
     rov, six, heavy = load_vehicle(VIDEORAY), _deep("bluerov2"), _deep("bluerov2_heavy")
-    plain_c = None
     if measurable():
         with say("steps in plain C"):
             steps = Steps(rov, heavy, effort.commands, effort.known)
-            measured = (rov, heavy, steps.turned)
-            plain_c, heavy_c, rotors_c = (PlainC(one, Path(tempfile.mkdtemp(dir=folder))) for one in measured)
-            steps.measure(plain_c, heavy_c, rotors_c, effort.repetitions)
+            plain_c, heavy_c = (PlainC(one, Path(tempfile.mkdtemp(dir=folder))) for one in (rov, heavy))
+            steps.measure(plain_c, heavy_c, effort.repetitions)
             yield from steps.sections()
             if picture_file:
                 write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()), force=True)
@@ -92,13 +89,6 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
     with say("simulators"):
         for one in (rov, six, heavy):
             yield simulators.section(one, effort.manoeuvres)
-    with say("the filter of the identification"):
-        for one in (rov, six):
-            yield kalman.section(one, min(effort.repetitions, 5))
-    with say("many instances and runs"):
-        if plain_c:
-            yield runs.instances(plain_c, effort.repetitions)
-            yield runs.variations(runs.Variations(rov, effort.runs).in_c(plain_c, effort.repetitions))
     with say("studies"):
         native = build_fmu(rov, folder / "native.fmu", platforms=["host"]).path
         yield runs.studies(native, folder, effort.study_runs)

@@ -1,7 +1,7 @@
 """Measurements in plain C, built with the compiler of the FMU and called in this process (Linux on x86-64)."""
 
 import ctypes
-from ctypes import POINTER, byref, c_double, c_long, c_size_t, c_void_p
+from ctypes import byref, c_double, c_long, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ CORE, EULER, RK4 = "core", "euler", "rk4"
 HEYOKA = "heyoka"
 BDF, ADAMS = CVODE = ("bdf", "adams")
 _SOURCES = Path(__file__).with_name("c")
-# A library uses only some functions of the FMU's sources. mallinfo's successor is newer than the GLIBC of this target.
+# A library uses only some functions of the FMU's sources.
 _FLAGS = (
     "-target",
     PLATFORMS[PLATFORM].target,
@@ -35,12 +35,11 @@ _FLAGS = (
     "-fno-asynchronous-unwind-tables",
     "-Wshadow",
     "-Wno-unused-function",
-    "-Wno-deprecated-declarations",
 )
 # Packed into pairs, RK4 takes a fifteenth longer for the VideoRay, and a tenth less for the Heavy.
 _FASTEST = ("-O3", "-fno-slp-vectorize")
 _SUNDIALS = (sundials_core._name, sundials_cvode._name)
-_REALS, _REFERENCES = np.ctypeslib.ndpointer(float, flags="C"), np.ctypeslib.ndpointer(np.uint32, flags="C")
+_REALS = np.ctypeslib.ndpointer(float, flags="C")
 
 Reals = NDArray[np.float64]
 
@@ -66,9 +65,7 @@ class PlainC:
             fmu.write_bytes(compile_all([PLATFORM], content[fmi].sources, vehicle.identifier)[PLATFORM])
             m = load("measure", fmi, "-ldl", *_SUNDIALS)
             m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_double, c_long, c_long, c_long, _REALS, _REALS)
-            m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
-            m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
-            m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
+            m.hold.restype = c_double
             m.begin(str(fmu).encode())
             return m
 
@@ -119,15 +116,3 @@ class PlainC:
         measure = self._measure_3 if method in (FMU_3, FMU_3_SET) else self._measure
         each = measure.hold(function, *solver, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end
-
-    def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:
-        """Step instances in turn by 10 ms. Return seconds per step and bytes per instance."""
-        memory = c_double()
-        return 1e-9 * self._measure.step_in_turn(instances, steps // instances, byref(memory)), memory.value
-
-    def run_each(self, references: list[int], values: Reals, commands: Reals) -> tuple[float, Reals]:
-        """Run ten commands of 10 s for each row of start values. Return the seconds and the final states."""
-        ends = np.empty((len(values), self._states))
-        vr = np.array(references, dtype=np.uint32)
-        seconds = 1e-9 * self._measure.run_each(len(values), vr, len(vr), values, commands, ends)
-        return seconds, ends

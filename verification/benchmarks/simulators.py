@@ -11,8 +11,7 @@ import numpy as np
 from mujoco import rollout
 
 from rov_fmu.bridges.gym import RovVectorEnv
-from rov_fmu.bridges.mujoco import load_mujoco, mujoco_texts
-from rov_fmu.bridges.mujoco.plugin import step
+from rov_fmu.bridges.mujoco import load_mujoco
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import SURGE, YAW
 from rov_fmu.report.plots.geometry import hull_size
@@ -47,19 +46,15 @@ def section(vehicle: Vehicle, repetitions: int) -> Section:
     environment = RovVectorEnv(vehicle, _FLEET, step=H, draws=False)
     environment.reset(seed=0)
     actions = np.zeros((_FLEET, len(environment.commands)))
-    bare, water = _three(vehicle)
     times = {
         "MuJoCo without water, in C": lambda: _in_c(none),
         "MuJoCo with its own fluid, in C": lambda: _in_c(fluid),
-        "MuJoCo without water, mj_step from Python": _loop(lambda: mujoco.mj_step(none, data)),
         "mj_step of the exported model, without the plug-in": _loop(lambda: mujoco.mj_step(rov.model, alone)),
         "MuJoCo with the plug-in": _loop(rov.step),
         "MuJoCo with the plug-in, 100 steps at once": _loop(lambda: rov.step(100), _STEPS // 100, 100),
-        "mj_step of a world with three vehicles": bare,
-        "that world with the plug-in": water,
         "RovVectorEnv, 1000 vehicles in lanes": _loop(lambda: environment.step(actions), 20, _FLEET),
     }
-    data, alone = mujoco.MjData(none), mujoco.MjData(rov.model)
+    alone = mujoco.MjData(rov.model)
     rows = {name: [run() for _ in range(max(repetitions, 3))] for name, run in times.items()}
     turn: Counter[str] = Counter()
     for axis, share in _TURN.items():
@@ -85,23 +80,6 @@ def _loop(step: Callable[[], object], steps: int = _STEPS, vehicles: int = 1) ->
         return (time.process_time() - began) / steps / vehicles
 
     return run
-
-
-def _three(vehicle: Vehicle) -> tuple[Callable[[], float], Callable[[], float]]:
-    """Return what measures mj_step of a world with three vehicles, and the step with the plug-in there."""
-    files = mujoco_texts(vehicle, "rov", {}, {})
-    spec = mujoco.MjSpec.from_string(files["scene.xml"], include={"vehicle.xml": files["vehicle.xml"].encode()})
-    for n in (1, 2):
-        frame = spec.worldbody.add_frame(pos=[0.0, 3.0 * n, 0.0])
-        spec.attach(mujoco.MjSpec.from_string(files["vehicle.xml"]), prefix=f"{n}_", frame=frame)
-    spec.option.timestep = H
-    model = spec.compile()
-    first: Any = load_mujoco(vehicle)
-    data, other = mujoco.MjData(model), mujoco.MjData(model)
-    rovs = [type(first)(first.library, first.equation, model, data, prefix) for prefix in ("", "1_", "2_")]
-    for one in (data, other):
-        one.ctrl[:] = vehicle.layout.command_of(0.1)
-    return _loop(lambda: mujoco.mj_step(model, other)), _loop(lambda: step(*rovs))
 
 
 def _in_c(model: Any) -> float:

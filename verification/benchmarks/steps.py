@@ -1,7 +1,6 @@
 """All that is measured in plain C: steps of the VideoRay and the BlueROV2 Heavy, and costs at equal error."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -20,20 +19,15 @@ class Steps:
         self.straight = Table("VideoRay, straight", rov, [CORE, FMU, RK4], commands, known, straight=True)
         self.one_way = Table("VideoRay, turning one way", rov, series, commands, known, one_way=True)
         self.heavy = Table("BlueROV2 Heavy, six axes and lag", heavy, [CORE, RK4], commands, max(4, known // 4))
-        curves = tuple(replace(curve, lag="speed") for curve in heavy.layout.curves)
-        self.turned = replace(heavy, layout=replace(heavy.layout, curves=curves))
-        """The Heavy with rotors that lag in speed."""
-        self.rotors = Table("The same with rotors that lag", self.turned, [CORE, RK4], commands, max(4, known // 4))
         self.sweeps = {method: self.turning.sweep(method, settings) for method, settings in SWEEPS.items()}
         self.ours = self.turning.jobs[CORE, 1.0]
 
-    def measure(self, plain_c: PlainC, heavy_c: PlainC, rotors_c: PlainC, repetitions: int) -> None:
+    def measure(self, plain_c: PlainC, heavy_c: PlainC, repetitions: int) -> None:
         """Measure all jobs."""
         tables = (self.turning, self.straight, self.one_way)
         jobs = [job for some in (*(t.jobs.values() for t in tables), *self.sweeps.values()) for job in some]
         self.measured = Measured(plain_c, jobs, repetitions)
         self.measured_heavy = Measured(heavy_c, [*self.heavy.jobs.values()], repetitions)
-        self.measured_rotors = Measured(rotors_c, [*self.rotors.jobs.values()], repetitions)
 
     def sections(self) -> Iterator[Section]:
         """Yield the tables, and the costs at equal error."""
@@ -42,7 +36,6 @@ class Steps:
         if HEYOKA not in self.one_way.methods:
             yield [NOT_INSTALLED]
         yield self.heavy.section(self.measured_heavy)
-        yield self.rotors.section(self.measured_rotors)
         section = [["ours, to rounding", duration(self.measured.cost(self.ours)), "1"]]
         for method, name in SOLVERS.items():
             cost, times = self.measured.compared(self.sweeps[method], self.ours)

@@ -1,13 +1,10 @@
-/* Measure held commands by several methods, and many instances of the FMU. plain_c.py calls this library, which is linked
- * with SUNDIALS. Times are processor time of this thread. */
+/* Measure held commands by several methods. plain_c.py calls this library, which is linked with SUNDIALS. Times are
+ * processor time of this thread. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmu.h"
 #include "motion.h"
 
-#include <malloc.h>
 #include <time.h>
-
-enum { HELD = 10 };
 
 /* All value references; the commands come first. */
 static unsigned reference[N_VARIABLES];
@@ -116,54 +113,4 @@ double hold(advance *method, handle solver, handle y, double h, long substeps, l
         CHECK(get_values(rov, STATES, N_STATES, s));
     }
     return each;
-}
-
-/* ---- Many instances and runs ---- */
-
-/* Step n instances in turn, straight ahead and down. Return nanoseconds per step; *bytes becomes the memory of each. */
-double step_in_turn(size_t n, size_t rounds, double *bytes)
-{
-    static const double h = 0.01;
-    double commands[N_COMMANDS];
-    for (int i = 0; i < N_COMMANDS; i++) {
-        commands[i] = 0.5;
-    }
-    fmu_instance *const c = malloc(n * sizeof *c);
-    CHECK(c != NULL);
-    const int before = mallinfo().uordblks; /* in use on the heap */
-    for (size_t i = 0; i < n; i++) {
-        c[i] = new_instance("rov", &CALLBACKS);
-    }
-    *bytes = (double)(mallinfo().uordblks - before) / (double)n;
-    for (size_t i = 0; i < n; i++) {
-        start_instance(c[i], COMMANDS, N_COMMANDS, commands);
-    }
-    double t = 0.0;
-    const double start = nanoseconds();
-    for (size_t round = 0; round < rounds; round++, t += h) {
-        for (size_t i = 0; i < n; i++) {
-            CHECK(do_step(c[i], t, h));
-        }
-    }
-    const double each = (nanoseconds() - start) / (double)(rounds * n);
-    for (size_t i = 0; i < n; i++) {
-        API.FreeInstance(c[i]);
-    }
-    free(c);
-    return each;
-}
-
-/* Run ten commands of 10 s, with n values set at the start of each run. Return nanoseconds; `end` gets the final states. */
-double run_each(size_t runs, const unsigned vr[], size_t n, const double *values,
-                const double command[HELD][N_COMMANDS], double end[][N_STATES])
-{
-    const double start = nanoseconds();
-    for (size_t i = 0; i < runs; i++) {
-        start_instance(rov, vr, n, values + i * n);
-        for (int k = 0; k < HELD; k++) {
-            CHECK(set_values(rov, COMMANDS, N_COMMANDS, command[k]) && do_step(rov, 10.0 * k, 10.0));
-        }
-        CHECK(get_values(rov, STATES, N_STATES, end[i]));
-    }
-    return nanoseconds() - start;
 }
