@@ -69,18 +69,6 @@ class Equations:
     points: Sequence[tuple[Sequence[Number], Sequence[Number]]] = ()
     """Positions in the body frame at which forces act, m, and the forces in the earth frame, N."""
 
-    def of(self, number: Callable[[Number], Number]) -> "Equations":
-        """Return the equations with other numbers."""
-
-        def axis(one: Axis) -> Axis:
-            pairs = [(number(A), number(B)) for A, B in (one.ahead, one.astern)]
-            gains = [number(gain) for gain in one.lagging]
-            return Axis(pairs[0], pairs[1], number(one.push), number(one.load), gains, number(one.inertia))
-
-        axes = {name: axis(one) for name, one in self.axes.items()}
-        lags = {name: Lag(number(lag.target), number(lag.T)) for name, lag in self.lags.items()}
-        return Equations(axes, lags, self.coupled, [([*map(number, r)], [*map(number, F)]) for r, F in self.points])
-
     @cached_property
     def places(self) -> list[int]:
         """The places of u, v, w and r among the velocities; -1 for an axis that there is not."""

@@ -7,13 +7,16 @@ velocity reverses, and Newton's method finds that time.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import gmpy2
 from gmpy2 import mpfr
 from mpmath import mp
 
-from .equations import Equations
+from rov_fmu.vehicle.vehicle import Vehicle
+
+from .equations import Equations, equations
 
 Number = Any  # a gmpy2 number
 Rates = Callable[[Sequence[Number]], list[Number]]
@@ -38,9 +41,9 @@ class _System:
     """The equations in numbers of gmpy2. The heading of a state is relative to the start."""
 
     def __init__(self, equations: Equations, psi: float) -> None:
-        self.held, self.psi = equations.of(real), mpfr(psi)
+        self.held, self.psi = equations, mpfr(psi)
         self.axes, self.lags = [*self.held.axes.values()], [*self.held.lags.values()]
-        self.names = [*equations.axes]
+        self.names, self.lagging = [*equations.axes], [f"F_{name}" for name in equations.lags]
         self.first_force = len(self.names) + 4
 
     def rates(self, signs: Sequence[int]) -> Rates:
@@ -74,8 +77,12 @@ class _System:
 
 
 def real(number: Any) -> Number:
-    """Convert a number of mpmath to gmpy2."""
-    return mpfr(mp.nstr(number, 90))
+    """Convert a number, which may be one of mpmath, to gmpy2."""
+    return mpfr(mp.nstr(mp.mpf(number), 90))
+
+
+_NUMBERS = SimpleNamespace(mpf=real, zero=mpfr(0), one=mpfr(1), inf=gmpy2.inf(), fsum=sum, sin=gmpy2.sin, cos=gmpy2.cos)
+"""The numbers of gmpy2, behind the names that mpmath uses."""
 
 
 def leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) -> tuple[list[Number], Number]:
@@ -174,13 +181,13 @@ def _dip(rates: Rates, y: Sequence[Number], end: Sequence[Number], a: int, sign:
     return None
 
 
-def integrate(equations: Equations, state: Mapping[str, float], h: float) -> Ended:
-    """Return the end of the motion after h seconds, without the current."""
+def integrate(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Ended:
+    """Return the end of the motion after h seconds with the inputs held, without the current."""
     with gmpy2.context(gmpy2.get_context(), precision=BITS):
-        system = _System(equations, state.get("psi", 0.0))
+        system = _System(equations(rov, inputs, _NUMBERS), state.get("psi", 0.0))
         n = len(system.names)
         y = [mpfr(state[name]) for name in system.names] + [mpfr(0)] * 4
-        y += [mpfr(state[f"F_{name}"]) for name in equations.lags]
+        y += [mpfr(state[name]) for name in system.lagging]
         fastest, paths = [abs(x) for x in y[:n]], [mpfr(0)] * 3
         remaining = mpfr(h)
         size = system.first_step(y)
@@ -197,7 +204,7 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
             paths = [path + step for path, step in zip(paths, steps, strict=True)]
             y, remaining = end, remaining - taken
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
-        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in equations.lags)]
+        names = [*system.names, "x", "y", "z", "psi", *system.lagging]
         planar, depth, turn = map(plain, paths)
         return Ended(
             {name: plain(x) for name, x in zip(names, y, strict=True)},

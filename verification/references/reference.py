@@ -244,7 +244,7 @@ def step(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], 
     with mp.workdps(4 * DIGITS):
         equation = equations(rov, inputs, mp)
         if equation.lags or equation.coupled:
-            ended = integrate(equation, state, h)
+            ended = integrate(rov, inputs, state, h)
             found, fastest, paths = ended.state, ended.fastest, ended.paths
         else:
             found, fastest, paths = _uncoupled(equation, state, h)

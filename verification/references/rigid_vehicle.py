@@ -25,12 +25,12 @@ _TOLERANCE = 1e-22  # of a step of the extrapolation
 
 
 def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = float) -> Body:
-    """Return a vehicle under held inputs as a rigid body. `number` converts numbers of mpmath to those of the body."""
+    """Return a vehicle under held inputs as a rigid body. `number` converts numbers to those of the body."""
     layout = rov.layout
-    held = {name: number(mp.mpf(value)) for name, value in {**rov.coefficients, **inputs}.items()}
+    held = {name: number(value) for name, value in {**rov.coefficients, **inputs}.items()}
 
     def get(name: str, otherwise: str = "", default: float = 0.0) -> Number:
-        return held.get(name, held.get(otherwise, number(mp.mpf(default))))
+        return held.get(name, held.get(otherwise, number(default)))
 
     def six(stem: str, default: float = 0.0) -> Array:
         return np.array([get(f"{stem}_{v}", default=default) for v in VELOCITIES])
@@ -55,7 +55,7 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         else:
             lift[i, j, VELOCITIES.index(others[1])] = value
     beta, thrusters = six("beta", 1.0), _thrusters(rov, inputs, number)
-    net, g = get("W") - get("B") if "W" in held else get("F_0_w"), number(mp.mpf("9.80665"))
+    net, g = get("W") - get("B") if "W" in held else get("F_0_w"), number("9.80665")
     displaced = -net / g, (get("B") * buoyancy - get("W") * gravity) / g
     rotors, has_rotor = _rotors(rov, inputs, number)
     return Body(
@@ -187,7 +187,7 @@ def step(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
 
             return rates
 
-        y, rest, size = [real(mp.mpf(x)) for x in places(rov, state)], mpfr(h), mpfr(h)
+        y, rest, size = [real(x) for x in places(rov, state)], mpfr(h), mpfr(h)
         while rest > 0:
             y, taken, size = until_reversal(rates_with, y, of_step.reversing, min(size, rest), _TOLERANCE)
             rest -= taken
@@ -202,9 +202,9 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     """
     layout = rov.layout
     y = np.array([number(x) for x in places(rov, values)])
-    R, held = rotation(y[6:10]), {name: number(mp.mpf(values.get(name, 0.0))) for name in ("V_N", "V_E", "V_D")}
+    R, held = rotation(y[6:10]), {name: number(values.get(name, 0.0)) for name in ("V_N", "V_E", "V_D")}
     tied: dict[str, Number] = {}
-    for name, at in _points(rov, lambda name: number(mp.mpf(values[name]))):
+    for name, at in _points(rov, lambda name: number(values[name])):
         outputs = (*(f"{x}_{name}" for x in "xyz"), *(f"vg_{d}_{name}" for d in "NED"))
         tied |= dict(zip(outputs, of_point(at, R, y[:6], y[10:13], np.array([*held.values()])), strict=True))
     if not layout.has_attitude:
