@@ -20,7 +20,7 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     printed = python("-m", "verification.benchmarks", "--quick", "--picture", str(picture), encoding="utf-8")
     parts = (
         "turning",
-        "fmi3SetFloat64",
+        "fmi2SetReal",
         "RK4",
         "A study by two workers",
         "MuJoCo with the plug-in",

@@ -36,8 +36,7 @@ class Effort:
 
 _HOW = """Medians of repetitions in turn: processor time on one core.
 A cell's second number is the error at the end of a held command against 50 digits, in SI units. Commands are held
-for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
-fmi3SetFloat64.
+for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal.
 """
 _QUICK = Effort(3, 1024, manoeuvres=1, study_runs=(100, 400))
 

@@ -8,7 +8,7 @@ import numpy as np
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, digits, duration, error
-from .plain_c import ADAMS, BDF, CORE, EULER, FMU, FMU_3_SET, FMU_SET, HEYOKA, RK4, PlainC, Reals
+from .plain_c import ADAMS, BDF, CORE, EULER, FMU, FMU_SET, HEYOKA, RK4, PlainC, Reals
 from .work import Work
 
 TARGET = 1e-9
@@ -22,7 +22,6 @@ NAMES = {
     CORE: "ours, without FMI",
     FMU: "ours, fmi2DoStep",
     FMU_SET: "ours, fmi2SetReal and fmi2DoStep",
-    FMU_3_SET: "ours, fmi3SetFloat64 and fmi3DoStep",
     RK4: f"RK4, sub-steps ≤ {1000 * SUBSTEP:g} ms",
     HEYOKA: "heyoka, loop in C++, thrust ahead and not timed",
 }

@@ -19,9 +19,9 @@ from verification.references.c_programs import compile_c
 from .taylor import Heyoka
 
 PLATFORM = "linux64"
-# The methods: the FMU, and the FMU with its commands set before every step, in FMI 2.0 and 3.0; its step without FMI;
-# the explicit methods; the methods of CVODE.
-FMU, FMU_SET, FMU_3, FMU_3_SET = FMUS = ("fmu", "fmu-set", "fmu-3", "fmu-3-set")
+# The methods: the FMU, and the FMU with its commands set before every step; its step without FMI; the explicit methods;
+# the methods of CVODE.
+FMU, FMU_SET = FMUS = ("fmu", "fmu-set")
 CORE, EULER, RK4 = "core", "euler", "rk4"
 HEYOKA = "heyoka"
 BDF, ADAMS = CVODE = ("bdf", "adams")
@@ -50,27 +50,22 @@ def measurable() -> bool:
 
 
 class PlainC:
-    """The FMU's shared library in both versions of FMI, and libraries with the other methods and the timing."""
+    """The FMU's shared library, and libraries with the other methods and the timing."""
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
-        content = {fmi: native_content(vehicle, fmi=fmi) for fmi in (2, 3)}
+        sources = native_content(vehicle).sources
         self._states = len(vehicle.layout.state)
 
-        def load(name: str, fmi: int, *flags: str) -> Any:
-            output, sources = folder / f"{name}-{fmi}.so", content[fmi].sources
+        def load(name: str, *flags: str) -> Any:
+            output = folder / f"{name}.so"
             return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, sources, *_FLAGS, *flags)))
 
-        def measure(fmi: int) -> Any:
-            fmu = folder / f"{vehicle.identifier}-{fmi}{PLATFORMS[PLATFORM].suffix}"
-            fmu.write_bytes(compile_all([PLATFORM], content[fmi].sources, vehicle.identifier)[PLATFORM])
-            m = load("measure", fmi, "-ldl", *_SUNDIALS)
-            m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_double, c_long, c_long, c_long, _REALS, _REALS)
-            m.hold.restype = c_double
-            m.begin(str(fmu).encode())
-            return m
-
-        self._explicit = load("explicit", 2, *_FASTEST)
-        self._measure, self._measure_3 = measure(2), measure(3)
+        fmu = folder / f"{vehicle.identifier}{PLATFORMS[PLATFORM].suffix}"
+        fmu.write_bytes(compile_all([PLATFORM], sources, vehicle.identifier)[PLATFORM])
+        self._explicit, self._measure = load("explicit", *_FASTEST), load("measure", "-ldl", *_SUNDIALS)
+        self._measure.hold.argtypes = (*[c_void_p] * 3, c_double, *[c_long] * 3, _REALS, _REALS)
+        self._measure.hold.restype = c_double
+        self._measure.begin(str(fmu).encode())
         self._solver = cache(self._new_solver)
         self._heyoka = cache(lambda: Heyoka(vehicle))
 
@@ -112,7 +107,6 @@ class PlainC:
         elif method not in FMUS:
             library = self._measure if method == CORE else self._explicit
             function = ctypes.cast(getattr(library, method), c_void_p)
-        substeps = 0 if method in (FMU_SET, FMU_3_SET) else 1 if method in CVODE else round(setting)
-        measure = self._measure_3 if method in (FMU_3, FMU_3_SET) else self._measure
-        each = measure.hold(function, *solver, h, substeps, steps, len(commands), commands, end)
+        substeps = 0 if method == FMU_SET else 1 if method in CVODE else round(setting)
+        each = self._measure.hold(function, *solver, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end

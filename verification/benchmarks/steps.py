@@ -6,7 +6,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 from .jobs import SOLVERS, SWEEPS, TARGET, Measured, Table
 from .page import Section, digits, duration, error
-from .plain_c import CORE, FMU, FMU_3_SET, FMU_SET, HEYOKA, RK4, PlainC
+from .plain_c import CORE, FMU, FMU_SET, HEYOKA, RK4, PlainC
 from .taylor import NOT_INSTALLED, installed
 
 
@@ -15,7 +15,7 @@ class Steps:
 
     def __init__(self, rov: Vehicle, heavy: Vehicle, commands: int, known: int) -> None:
         series = [CORE, *([HEYOKA] if installed() else [])]
-        self.turning = Table("VideoRay, turning", rov, [CORE, FMU_SET, FMU_3_SET, RK4], commands, known)
+        self.turning = Table("VideoRay, turning", rov, [CORE, FMU_SET, RK4], commands, known)
         self.straight = Table("VideoRay, straight", rov, [CORE, FMU, RK4], commands, known, straight=True)
         self.one_way = Table("VideoRay, turning one way", rov, series, commands, known, one_way=True)
         self.heavy = Table("BlueROV2 Heavy, six axes and lag", heavy, [CORE, RK4], commands, max(4, known // 4))
