@@ -709,7 +709,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 @click.option(
     "--engine",
     type=_Choice(["lanes", "fmu"]),
-    help="What runs a vehicle: its equations in this process, which is the default, or its FMU on Dask workers.",
+    help="What runs a vehicle: its equations in this process, which is the default, or its FMU in processes.",
 )
 @click.option(
     "--part",

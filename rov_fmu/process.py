@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 from traceback import format_exception
@@ -100,41 +99,14 @@ def run_process(program: str, main: Callable[[], int]) -> int:
 
 
 def _end_interrupted(program: str) -> None:
-    """End all child processes, clean up, print one line, and end the process without waiting for any thread."""
+    """Clean up, print one line, and end the process without waiting for any thread."""
     from rov_fmu.io.interrupts import UNINTERRUPTED, clean_up_everything
 
     with UNINTERRUPTED:  # no other thread begins or prints anything more
         try:
-            _kill_children()
             _print_error(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
-            # Dask restarts the workers. One that starts now prints a traceback when this process ends in between.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-            _kill_children()  # those that started before, with the terminal as their stderr
         finally:
             os._exit(130)
-
-
-def _kill_children() -> None:
-    """Kill the worker processes.
-
-    multiprocessing does not list a worker that a thread of Dask is just starting. Such a worker would print a traceback
-    when this process ends, so it is found with psutil, which Dask imports. Until it runs its own program, it has no
-    command line, or that of this process.
-    """
-    from multiprocessing import active_children
-
-    for child in active_children():
-        with suppress(ValueError):  # another thread has already joined the child
-            child.kill()
-    if "psutil" in sys.modules:
-        import psutil
-
-        own = psutil.Process()
-        for process in own.children():
-            with suppress(psutil.Error):  # it has ended
-                command = process.cmdline()
-                if command in ([], own.cmdline()) or any("spawn_main" in part for part in command):
-                    process.kill()
 
 
 def _print_error(program: str, message: str, code: int) -> int:

@@ -91,22 +91,35 @@ class Instance:
     """An instance of an FMU. Raises LoadError."""
 
     def __init__(self, unpacked: Unpacked, *, logging: bool = False) -> None:
-        from fmpy.simulation import instantiate_fmu
-
         self._unpacked, self._version = unpacked, unpacked.description.fmiVersion[:1]
-        forget_message()
-        here = Path.cwd()
-        try:
-            self.fmu = instantiate_fmu(
-                unpacked.folder, unpacked.description, "CoSimulation", debug_logging=logging, logger=keep_message
-            )
-        except Exception as error:  # FMPy raises that itself
-            raise LoadError(brief(f"{unpacked.without_folder(error)}{last_message()}", 240)) from error
-        finally:
-            os.chdir(here)  # FMPy changes the folder, and may not change it back
+        self.fmu: Any = None
+        self.renew(logging=logging)
         self._kept, self.time = cache(self.tables), 0.0
         self.do_step: Callable[[float, float], int] = self._stepping()
         """Takes a step from a time over a length, s, and returns the status. Raises CallError if the run ends."""
+
+    def renew(self, *, logging: bool = False) -> None:
+        """Make a new instance in place of one that was freed. Tables remain valid. Raises LoadError.
+
+        FMPy loads the library once, which takes 2 ms, because it declares each function of FMI.
+        """
+        from fmpy.simulation import instantiate_fmu
+
+        forget_message()
+        here = Path.cwd()
+        try:
+            if self.fmu is None:
+                folder, description = self._unpacked.folder, self._unpacked.description
+                self.fmu = instantiate_fmu(
+                    folder, description, "CoSimulation", debug_logging=logging, logger=keep_message
+                )
+            else:
+                logger = {"callbacks": self.fmu.callbacks} if self._version == "2" else {"logMessage": keep_message}
+                self.fmu.instantiate(loggingOn=logging, **logger)
+        except Exception as error:  # FMPy raises that itself
+            raise LoadError(brief(f"{self._unpacked.without_folder(error)}{last_message()}", 240)) from error
+        finally:
+            os.chdir(here)  # FMPy changes the folder, and may not change it back
 
     def read(self, names: Iterable[str]) -> list[Any]:
         """Return the values of variables. Raises CallError."""
@@ -131,7 +144,7 @@ class Instance:
         variables = [self._unpacked.variables[name] for name in names]
         references = np.array([v.reference for v in variables], np.uint32)
         values = np.zeros((rows, len(names)), variables[0].dtype)
-        count, row_size, component = len(names), values.strides[0], self.fmu.component
+        count, row_size, fmu = len(names), values.strides[0], self.fmu
         more = (count,) if self._version == "3" else ()  # as many values as references: all are scalars
 
         def call(verb: str) -> Callable[[int], int]:
@@ -142,7 +155,7 @@ class Instance:
             at, first = references.ctypes.data, values.ctypes.data
 
             def of_row(row: int) -> int:
-                status: int = function(component, at, count, first + row * row_size, *more)
+                status: int = function(fmu.component, at, count, first + row * row_size, *more)
                 return status
 
             return of_row
@@ -151,11 +164,11 @@ class Instance:
             return VariableTable(names, values, call("Get"), call("Set"))
 
         def get(row: int) -> int:
-            values[row] = self.fmu.getString(references.tolist())
+            values[row] = fmu.getString(references.tolist())
             return 0
 
         def put(row: int) -> int:
-            self.fmu.setString(references.tolist(), values[row].tolist())
+            fmu.setString(references.tolist(), values[row].tolist())
             return 0
 
         return VariableTable(names, values, get, put)
@@ -220,16 +233,16 @@ class Instance:
         return function
 
     def _stepping(self) -> Callable[[float, float], int]:
-        number, pointer, component = ctypes.c_double, ctypes.c_void_p, self.fmu.component
+        number, pointer, fmu = ctypes.c_double, ctypes.c_void_p, self.fmu
         if self._version == "2":
             two = self._function("DoStep", number, number, ctypes.c_int)
-            return lambda time, length: two(component, time, length, True)
+            return lambda time, length: two(fmu.component, time, length, True)
         three = self._function("DoStep", number, number, ctypes.c_bool, *[pointer] * 4)
         flags, last = (ctypes.c_bool * 3)(), number()
         told = [ctypes.addressof(flags) + n for n in range(3)], ctypes.addressof(last)
 
         def step(time: float, length: float) -> int:
-            status: int = three(component, time, length, True, *told[0], told[1])
+            status: int = three(fmu.component, time, length, True, *told[0], told[1])
             if flags[1]:
                 raise CallError(f"the FMU ended the run at {last.value:.6g} s")
             return status

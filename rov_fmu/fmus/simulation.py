@@ -1,4 +1,4 @@
-"""Runs of an unpacked FMU: for Co-Simulation in one instance, where it can be reset, or else with FMPy's solver."""
+"""Runs of an unpacked FMU: for Co-Simulation with a new instance for each run, or else with FMPy's solver."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -29,74 +29,60 @@ class Simulation:
 
         `varied` names the variables that get other start values in each run.
         """
-        self._unpacked, self._times, self._step, self._tolerance = Unpacked(folder), times.tolist(), step, tolerance
-        self._start_values, self._signals, self._record, self._varied = start, inputs, record, varied
-        self._begin_instance()
+        self._times, self._step, self._tolerance, self._varied = times.tolist(), step, tolerance, varied
+        instance = self._instance = Instance(Unpacked(folder))
+        self._reads = instance.tables(record, len(times))
+        self._start = instance.tables({**start, **dict.fromkeys(varied)})
+        self._places = {name: table.values[0, n : n + 1] for table in self._start for n, name in enumerate(table.names)}
+        for name, value in start.items():
+            self._places[name][0] = value
+        self._changes = defaultdict[int, list[tuple[Callable[[int], int], int]]](list)
+        """By step, the calls that set the inputs which change at the beginning of this step."""
+        for table in instance.tables(inputs, len(times) - 1):
+            table.values[:] = np.transpose([inputs[name] for name in table.names])
+            differs = np.any(table.values[1:] != table.values[:-1], axis=1)
+            for n in [0, *(np.flatnonzero(differs) + 1).tolist()]:
+                self._changes[n].append((table.set, n))
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
-        """Run once and return every recorded variable at every communication point.
+        """Run once, in a new instance, and return every recorded variable at every communication point.
 
         `values` are those of the varied variables. The next run overwrites the returned arrays. Raises RunError.
         """
         try:
             self._run(values)
         except CallError as failed:
-            reason = self._with_message(values) or str(failed)
-            self.renew()
+            reason = str(failed)
+            try:
+                self._run(values, logging=True)
+            except CallError as again:
+                reason = f"{again}{last_message()}"
             raise RunError(brief(reason, 240)) from failed
         return {name: table.values[:, n] for table in self._reads for n, name in enumerate(table.names)}
 
-    def reset(self) -> None:
-        """Make ready for the next run, with a new instance if the FMU cannot be reset."""
-        from fmpy.fmi1 import FMICallException
-
-        try:
-            self._instance.fmu.terminate()
-            self._instance.fmu.reset()
-        except FMICallException:
-            self.renew()
-
-    def renew(self) -> None:
-        """Continue with a new instance."""
-        self.free()
-        self._begin_instance()
-
-    def free(self) -> None:
-        """Free the instance."""
-        self._instance.free()
-
-    def _begin_instance(self, *, logging: bool = False) -> None:
-        instance = self._instance = Instance(self._unpacked, logging=logging)
-        self._reads = instance.tables(self._record, len(self._times))
-        self._start = instance.tables({**self._start_values, **dict.fromkeys(self._varied)})
-        self._places = {name: table.values[0, n : n + 1] for table in self._start for n, name in enumerate(table.names)}
-        for name, value in self._start_values.items():
-            self._places[name][0] = value
-        self._changes = defaultdict[int, list[tuple[Callable[[int], int], int]]](list)
-        """By step, the calls that set the inputs which change at the beginning of this step."""
-        for table in instance.tables(self._signals, len(self._times) - 1):
-            table.values[:] = np.transpose([self._signals[name] for name in table.names])
-            differs = np.any(table.values[1:] != table.values[:-1], axis=1)
-            for n in [0, *(np.flatnonzero(differs) + 1).tolist()]:
-                self._changes[n].append((table.set, n))
-
-    def _run(self, values: Sequence[float]) -> None:
+    def _run(self, values: Sequence[float], *, logging: bool = False) -> None:
+        instance, times, step, changes = self._instance, self._times, self._step, self._changes
+        if instance.fmu.component is None:
+            instance.renew(logging=logging)
         for name, value in zip(self._varied, values, strict=True):
             self._places[name][0] = value
-        times, step, changes, do_step = self._times, self._step, self._changes, self._instance.do_step
-        reads = [table.get for table in self._reads]
-        self._instance.begin(times[0], times[-1], self._tolerance, self._set_start, self._set_first)
-        for get in reads:
-            check_status(get(0), "reading", times[0])
-        for n in range(len(times) - 1):
-            for put, row in changes.get(n, ()):
-                if (status := put(row)) > WARNING:
-                    check_status(status, "setting the inputs", times[n])
-            if (status := do_step(times[n], step)) > WARNING:
-                check_status(status, "the step", times[n])
+        reads, do_step = [table.get for table in self._reads], instance.do_step
+        try:
+            instance.begin(times[0], times[-1], self._tolerance, self._set_start, self._set_first)
             for get in reads:
-                if (status := get(n + 1)) > WARNING:
-                    check_status(status, "reading", times[n + 1])
+                check_status(get(0), "reading", times[0])
+            for n in range(len(times) - 1):
+                for put, row in changes.get(n, ()):
+                    if (status := put(row)) > WARNING:
+                        check_status(status, "setting the inputs", times[n])
+                if (status := do_step(times[n], step)) > WARNING:
+                    check_status(status, "the step", times[n])
+                for get in reads:
+                    if (status := get(n + 1)) > WARNING:
+                        check_status(status, "reading", times[n + 1])
+            instance.end()
+        finally:
+            instance.free()
 
     def _set_start(self) -> None:
         for table in self._start:
@@ -105,16 +91,6 @@ class Simulation:
     def _set_first(self) -> None:
         for put, row in self._changes.get(0, ()):
             check_status(put(row), "setting the inputs", self._times[0])
-
-    def _with_message(self, values: Sequence[float]) -> str:
-        """Repeat a failed run with logging on, and return the reason with the FMU's last warning."""
-        self.free()
-        self._begin_instance(logging=True)
-        try:
-            self._run(values)
-        except CallError as failed:
-            return f"{failed}{last_message()}"
-        return ""
 
 
 class Exchange:

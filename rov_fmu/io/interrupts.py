@@ -1,9 +1,6 @@
 """Protects actions that Ctrl-C must not interrupt half-way, and cleans up when Ctrl-C ends the process."""
 
-import os
 import shutil
-import signal
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -66,42 +63,6 @@ def clean_up_everything() -> list[str]:
         with suppress(Exception):
             clean()
     return [note for _, note in _PENDING if note]
-
-
-@contextmanager
-def ctrl_c_withheld() -> Iterator[None]:
-    """Block SIGINT, so that Ctrl-C in a terminal does not reach the processes that are started in the block.
-
-    These processes, and threads that are started here, inherit the blocked signal; this process ends them. On Windows
-    the block has no effect.
-    """
-    if sys.platform == "win32":
-        yield
-        return
-    _start_resource_tracker()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start_resource_tracker() -> None:
-    """Start Python's helper process that removes the semaphores of a process which has ended.
-
-    Starting it unblocks SIGINT, so it must be started first. Its warning about semaphores that it had to remove is
-    switched off, because they are expected after an interrupt.
-    """
-    from multiprocessing.resource_tracker import ensure_running
-
-    given = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = ",".join([*([given] if given else []), "ignore:resource_tracker:UserWarning"])
-    try:
-        ensure_running()
-    finally:
-        del os.environ["PYTHONWARNINGS"]
-        if given is not None:
-            os.environ["PYTHONWARNINGS"] = given
 
 
 def _remove(folder: str) -> None:

@@ -83,10 +83,10 @@ class Command:
             assert self.process.poll() is None, self.process.communicate()[1]
             time.sleep(0.002)
 
-    def workers(self) -> list[psutil.Process]:
+    def children(self) -> list[psutil.Process]:
         with suppress(psutil.Error):
             children = psutil.Process(self.process.pid).children(recursive=True)
-            return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+            return [child for child in children if "_serve" in " ".join(child.cmdline())]
         return []
 
     def press_ctrl_c(self) -> str:
@@ -115,7 +115,7 @@ class Command:
 
 
 _MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
-"""Seconds after the first worker of a study has started; None is when the first runs are written."""
+"""Seconds after the first process for the runs of a study has started; None is when the first runs are written."""
 
 
 @pytest.mark.long
@@ -139,7 +139,7 @@ figures = {{ V = "u[-1]" }}
         if later is None:
             study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
         else:
-            study.wait_until(study.workers)
+            study.wait_until(lambda: (results / "study.json").exists() and study.children())
             time.sleep(later)
         assert end(study) == LINE_OF_A_STUDY
     if later == 0.0:

@@ -142,8 +142,8 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
         fsync(descriptor)
 
     with monkeypatch.context() as patched:
-        patched.setattr("rov_fmu.study.run.cluster._LEAST", 0.0)
-        patched.setattr("rov_fmu.study.run.cluster._TASK", 1e-4)
+        patched.setattr("rov_fmu.study.run.work._LEAST", 0.0)
+        patched.setattr("rov_fmu.study.run.work._TASK", 1e-4)
         patched.setattr(os, "fsync", full)
         assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler]) == 2
     line = without_progress(capsys.readouterr().err)

@@ -22,7 +22,7 @@ from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.plan.study import Study, prepare
 from rov_fmu.study.run.child import Child, simulator
-from rov_fmu.study.run.lanes import runs, simulated
+from rov_fmu.study.run.local import runs, simulated
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.often import spread
@@ -82,8 +82,6 @@ def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: 
     for own, row in zip(outputs, values.tolist(), strict=True):
         for name, found, told in zip(study.recorded, own, fmu.run(row).values(), strict=True):
             worst[name] = max(worst.get(name, 0.0), np.abs(found - told).max() / max(1.0, np.abs(told).max()))
-        fmu.reset()
-    fmu.free()
     assert max(worst.values()) < 1e-12, {n: v for n, v in worst.items() if v > 1e-12}
 
 
@@ -137,7 +135,7 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     plan, parted = _plan(tmp_path, f'sampler = "{sampler}"\n{PLAN}'), tmp_path / "parted"
     whole = run_study(plan, tmp_path / "whole", workers=1)
     given = ["study", str(plan), "-o", str(parted)]
-    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 5)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 5)
     for part in ("1/3", "3/3"):
         assert main([*given, "--part", part]) == 0
     assert not [*parted.glob("*.html")]
@@ -175,7 +173,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
 ) -> None:
     plan, progress = _plan(tmp_path), list[StudyProgress]()
     whole = run_study(plan, tmp_path / "whole")
-    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 7)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 7)
 
     def interrupt(now: StudyProgress) -> None:
         progress.append(now)
@@ -185,7 +183,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
     with pytest.raises(KeyboardInterrupt):
         run_study(plan, tmp_path / "results", on_progress=interrupt)
     assert [*Results(tmp_path / "results").runs.index] == [*range(21)]
-    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 4)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 4)
     same(run_study(plan, tmp_path / "results", on_progress=progress.append), whole)
     assert [now.done for now in progress] == [0, 7, 14, 21, 21, 25, 29, 33, 37, 40]
     assert {now.total for now in progress} == {40}
@@ -202,10 +200,10 @@ def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(six
         keep={"outputs": ["x"]},
         figures={"end": "x[-1]"},
     )
-    with closing(Child(str(six_dir), study)) as fmu:
-        found = runs(study, rov, design.rows(0, 4), None, lambda: fmu)
-    assert [run.status for run in found] == ["done", "failed", "failed", "failed"]
-    reasons = [run.reason or "" for run in found]
+    with closing(Child(six_dir, study)) as fmu:
+        found = runs(study, rov, design.rows(0, 4), None, fmu.runs)
+    assert [run["status"] for run in found] == ["done", "failed", "failed", "failed"]
+    reasons = [run["reason"] or "" for run in found]
     assert reasons[1].startswith("the step at 0 s: ")
     assert reasons[2] == reasons[3]
     assert "the mass matrix of these parameters is not positive definite" in reasons[2]

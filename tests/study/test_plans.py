@@ -193,10 +193,8 @@ def test_angles_of_an_attitude_are_recorded_and_a_plan_is_the_same_whatever_does
     assert (with_attitude.angles, with_attitude.recorded) == (("phi", "theta"), ["b", "phi", "theta"])
     assert prepared("runs = 9\n", [*"ab", "phi", "theta"]).angles == ()
     found = prepared("runs = 9\n")
-    assert (len(found.trials), *found.about["warnings"]) == (
-        8,
-        "v.fmu has no inputs: its parameters and start values alone determine its runs",
-    )
+    (warning,) = found.about["warnings"]
+    assert warning == "v.fmu has no inputs: its parameters and start values alone determine its runs"
     assert prepared('runs = 5\ntitle = "T"\ntime_limit = 1\n').about["plan"] == found.about["plan"]
     hypercube = 'sampler = "latin-hypercube"\n'
     five, nine = (prepared(f"runs = {runs}\n{hypercube}").about["plan"] for runs in (5, 9))

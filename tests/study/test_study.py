@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from distributed import LocalCluster
 
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
+from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import WriteError
 from rov_fmu.report.progress import StudyProgress
@@ -116,13 +116,12 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pyte
     assert whole.trajectories([3, 5]).run.tolist() == [3] * 5 + [5] * 5
 
 
-@pytest.mark.parametrize("reset", [pytest.param(1, marks=pytest.mark.long), 2])
-def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
-    reset: int, do: Callable[..., Results], whole: Results
+def test_an_fmu_whose_reset_does_nothing_gives_the_rows_of_one_that_resets(
+    do: Callable[..., Results], whole: Results
 ) -> None:
-    """A reset that does nothing leaves y as it was."""
+    """Such a reset leaves y as it was, so each run has an instance of its own."""
     others = _processes("_serve")
-    same(do(reset), whole)
+    same(do(1), whole)
     assert _processes("_serve") <= others, "the processes of the FMU have ended"
 
 
@@ -168,14 +167,16 @@ def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_t
     """With a = 2 the roll passes 90 degrees. A run takes thousandths of a second."""
     plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]", limit=2.0), tmp_path / "unpacked"
     study, _ = prepare(load_plan(plan), plan, read_model(foreign()))
-    child = Child(str(folder), replace(study.unpacked(folder), trials=np.zeros((1, 4))))
+    child = Child(folder, study.unpacked(folder))
     runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, mode], [1.0, 0.0, 0.0, 0.0]]))
     child.close()
-    assert [(run.status, run.reason, run.turned) for run in runs] == [
+    assert [(run["status"], run["reason"], run.get("turned")) for run in runs] == [
         ("done", None, True),
-        ("failed", f"the FMU {reason}", False),
+        ("failed", f"the FMU {reason}", None),
         ("done", None, False),
     ]
+    with pytest.raises(LoadError, match="the study has ended"):
+        child.runs(np.zeros((1, 4)))
 
 
 @pytest.mark.long
@@ -377,17 +378,18 @@ def test_an_interrupted_or_killed_study_goes_on_where_it_was(
 @posix
 @pytest.mark.long
 def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
-    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
-    process = _begun(plan, results)
-    children = psutil.Process(process.pid).children()
-    victims = [child for child in children if any("spawn_main" in word for word in child.cmdline())]
-    assert len(victims) == 2
-    for victim in victims:
-        victim.kill()
-    lines = without_progress(process.communicate(timeout=600)[1]).splitlines()
-    assert [line for line in lines if "the vehicle turned over" not in line] == []
-    assert process.returncode == 0
-    same(Results(results), slow)
+    alive = set[int]()
+    with LocalCluster(n_workers=2, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
+        alive.update(worker.pid for worker in cluster.workers.values())
+        assert len(alive) == 2
+
+        def kill(now: StudyProgress) -> None:
+            while now.done and alive:
+                os.kill(alive.pop(), signal.SIGKILL)
+
+        plan, address = _plan(tmp_path, foreign(), **SLOW), cluster.scheduler_address
+        same(run_study(plan, tmp_path / "results", scheduler=address, on_progress=kill), slow)
+    assert not alive
 
 
 def test_a_scheduler_that_is_not_there_is_a_line(
@@ -459,21 +461,13 @@ def test_what_goes_wrong_on_the_workers_is_a_line(
 
 
 @pytest.mark.long
-def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
-    foreign: Foreign, tmp_path: Path, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("has_scheduler", [True, False])
+def test_an_fmu_without_an_instance_is_a_line(
+    has_scheduler: bool, foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
     with pytest.raises(FileError) as refused:
-        do(3)
+        run_study(_plan(tmp_path, foreign(3)), tmp_path / "results", scheduler=scheduler if has_scheduler else None)
     assert str(refused.value) == "foreign.fmu: cannot be run: Failed to instantiate model; the FMU: no licence"
-    needs = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
-    for patched, value, told in (
-        ("rov_fmu.study.run.cluster.LocalCluster", _fail(RuntimeError()), "the workers do not start"),
-        ("__main__.__file__", "gone.py", "workers cannot be started, because gone.py is not a file"),
-    ):
-        monkeypatch.setattr(patched, value, raising=False)
-        with pytest.raises(StudyError) as lost:
-            run_study(_plan(tmp_path, foreign()), tmp_path / "results")
-        assert str(lost.value) == f"{told}; {needs}"
 
 
 @pytest.mark.weekly

@@ -31,9 +31,6 @@ from rov_fmu.study.plan.sampling import Design, some_of
 from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-_TRIALS = 8
-"""The number of runs that are tried until one ends, to find out whether the FMU can be reset."""
-
 
 @dataclass(frozen=True)
 class Study:
@@ -51,8 +48,6 @@ class Study:
     """The variables that are read before the first step and after every step."""
     angles: Sequence[str]
     """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
-    trials: Array
-    """The values of the first runs, with which it is found out whether the FMU can be reset."""
     about: Mapping[str, Any]
     """The description of the study in its results, as JSON values."""
 
@@ -93,9 +88,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
         "groups": design.groups,
         "warnings": [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *design.warnings()],
     }
-    trials = design.rows(0, min(_TRIALS, design.runs))
     key = f"rov-fmu-{uuid4().hex}"
-    return Study(key, model, plan, design.names, inputs, recorded, angles, trials, about), design
+    return Study(key, model, plan, design.names, inputs, recorded, angles, about), design
 
 
 def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:

@@ -1,79 +1,91 @@
-"""Runs in a child process: when the FMU ends the process, or does not return, only that run fails."""
+"""Runs in child processes: when the FMU ends its process, or does not return, only that run fails."""
 
+import shutil
+import tempfile
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from threading import get_ident
+from time import perf_counter
 
 from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.study.plan.study import Study
-from rov_fmu.study.run.run import FAILED, Evaluation, Run
+from rov_fmu.study.run.run import Evaluation, Rows, Run, lost, rows_of
 from rov_fmu.study.run.system import SystemModel, SystemSimulator
 
 _MANY = 10.0
 """The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""
 
 
+class Children:
+    """The child processes of a study on one machine: one for each thread that does runs."""
+
+    def __init__(self, study: Study, parent: str) -> None:
+        """Unpack the FMU into a new folder in the folder `parent`. Raises FileError."""
+        self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=parent)).absolute()
+        self._study = study.unpacked(self._folder)
+        self._of_threads = dict[int, Child]()
+
+    def runs(self, values: Array) -> list[Run]:
+        """Run once with each row of values. Raises LoadError."""
+        return self._of_threads.setdefault(get_ident(), Child(self._folder, self._study)).runs(values)
+
+    def rows(self, first: int, values: Array) -> Rows:
+        """Do the runs from number `first` on, one for each row of values. Raises LoadError."""
+        began = perf_counter()
+        found = self.runs(values)
+        return rows_of(self._study, first, values, found, perf_counter() - began)
+
+    def close(self) -> None:
+        """End the processes, and remove the folder. Other threads that are doing runs get a LoadError."""
+        for child in [*self._of_threads.values()]:
+            child.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
 class Child:
-    """An instance of the FMU in a child process, which is started again when it ends. Raises LoadError."""
+    """A child process that does runs, and is started again when it ends."""
 
-    def __init__(self, folder: str, study: Study) -> None:
-        self._folder, self._study = folder, study
+    def __init__(self, folder: Path, study: Study) -> None:
+        self._folder, self._study, self._is_closed = folder, study, False
         self._process: ChildProcess | None = None
-        self._resets = self._can_be_reset()
 
-    def runs(self, rows: Array) -> list[Run]:
-        """Run once with each row of values. If the process ends, each row is run alone."""
-        limit = self._study.plan.time_limit
+    def runs(self, values: Array) -> list[Run]:
+        """Run once with each row of values. If the process ends, each row is run alone. Raises LoadError."""
+        plan = self._study.plan
+        limits = budget(plan.time_limit + (len(values) > 1) * _MANY)
+        process = self._process = self._process or self._started()
         try:
-            found: list[Run] = self._call("runs", rows, self._resets, time=limit + (len(rows) > 1) * _MANY)
+            found: list[Run] = process.call("runs", values, limits=limits)
         except ChildError as error:
-            if len(rows) > 1:
-                return [run for n in range(len(rows)) for run in self.runs(rows[n : n + 1])]
-            return [Run(FAILED, self._words(error, limit))]
+            self._process = None
+            if len(values) > 1:
+                return [run for n in range(len(values)) for run in self.runs(values[n : n + 1])]
+            return [lost(self._words(error))]
         return found
 
     def close(self) -> None:
-        """End the process."""
-        if self._process:
-            self._process.close()
+        """End the process for good."""
+        self._is_closed, process, self._process = True, self._process, None
+        if process:
+            process.close()
 
-    def _can_be_reset(self) -> bool:
-        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends.
-
-        A system gets new instances for each run.
-        """
-        study = self._study
-        for values in () if isinstance(study.model, SystemModel) else study.trials:
-            try:
-                return bool(self._call("can_be_reset", values, study.trials[-1], time=study.plan.time_limit))
-            except (RunError, ChildError):
-                continue
-        return False
-
-    def _call(self, method: str, *arguments: Any, time: float) -> Any:
-        limits = budget(time)
-        if not self._process:
-            try:
-                # In the folder of the worker, which the study removes even where Dask kills the worker.
-                beside = str(Path(self._folder).parent)
-                self._process = ChildProcess(_Runner, self._folder, self._study, limits=limits, temporary=beside)
-            except ChildError as error:
-                raise LoadError(self._words(error, time)) from error
+    def _started(self) -> ChildProcess:
+        if self._is_closed:
+            raise LoadError("the study has ended")
+        folder, limits = self._folder, budget(self._study.plan.time_limit)
         try:
-            return self._process.call(method, *arguments, limits=limits)
-        except ChildError:
-            self._process = None
-            raise
+            # Its own folder is in that of the worker, which the study removes even where Dask kills the worker.
+            return ChildProcess(_Runner, str(folder), self._study, limits=limits, temporary=str(folder.parent))
+        except ChildError as error:
+            raise LoadError(self._words(error)) from error
 
-    def _words(self, error: ChildError, limit: float) -> str:
+    def _words(self, error: ChildError) -> str:
         """Return what an FMU did."""
         exceeds_time = isinstance(error, LimitError) and error.limit == "time"
-        did = f"did not return within time_limit = {limit:g} s" if exceeds_time else error
-        return f"{self._study.model.running(self._folder)} {did}"
+        did = f"did not return within time_limit = {self._study.plan.time_limit:g} s" if exceeds_time else error
+        return f"{self._study.model.running(str(self._folder))} {did}"
 
 
 def simulator(folder: str, study: Study) -> Simulation | SystemSimulator:
@@ -86,28 +98,17 @@ def simulator(folder: str, study: Study) -> Simulation | SystemSimulator:
 
 
 class _Runner:
-    """The object in the child process: an instance of the FMU, and the figures."""
+    """The object in the child process: an FMU or a system, and the figures."""
 
     def __init__(self, folder: str, study: Study) -> None:
         self._simulator, self._evaluation = simulator(folder, study), Evaluation(study)
 
-    def can_be_reset(self, values: Array, others: Array) -> bool:
-        """Repeat a run in the same instance, after a run with other values, and compare it. Raises RunError."""
-        first = {name: recorded.copy() for name, recorded in self._simulator.run(values.tolist()).items()}
-        for row in (others, values):
-            self._simulator.reset()
-            again = self._simulator.run(row.tolist())
-        self._simulator.renew()
-        return all(np.array_equal(first[name], again[name], equal_nan=True) for name in first)
-
-    def runs(self, rows: Array, resets: bool) -> list[Run]:
+    def runs(self, values: Array) -> list[Run]:
         """Run once with each row of values."""
-        found = []
-        for values in rows.tolist():
-            try:
-                found.append(self._evaluation.run(values, self._simulator.run(values)))
-            except RunError as error:
-                found.append(Run(FAILED, str(error)))
-            else:
-                (self._simulator.reset if resets else self._simulator.renew)()
-        return found
+        return [self._run(row) for row in values.tolist()]
+
+    def _run(self, values: list[float]) -> Run:
+        try:
+            return self._evaluation.run(values, self._simulator.run(values))
+        except RunError as error:
+            return lost(error)

@@ -15,20 +15,16 @@ from rov_fmu.study.results.store import parquet
 
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
+TURNED = "turned"
+"""True of a run in which the vehicle turned over: it rolled or pitched by more than 90 degrees. It is no column."""
+
+Run = dict[str, Any]
+"""What a run gave, by column: status, reason, figures and trajectory. A run that failed has the first two."""
 
 
-class Run(NamedTuple):
-    """What a run gave."""
-
-    status: str
-    reason: str | None = None
-    """Why a figure is missing, or why the run did not end."""
-    figures: Sequence[float | None] = ()
-    """The figures, if the run ended. One that cannot be computed is None."""
-    kept: Mapping[str, npt.NDArray[Any]] | None = None
-    """The values of each kept output, if the run ended."""
-    turned: bool = False
-    """True if the vehicle turned over: it rolled or pitched by more than 90 degrees."""
+def lost(reason: object) -> Run:
+    """Return a run that did not end."""
+    return {STATUS: FAILED, REASON: str(reason)}
 
 
 class Evaluation:
@@ -41,11 +37,16 @@ class Evaluation:
 
     def run(self, values: Sequence[float], outputs: Mapping[str, npt.NDArray[Any]]) -> Run:
         """Return the run that has these values of the varied variables, and these outputs over time."""
-        study = self._study
+        study, plan = self._study, self._study.plan
         figures, reason = self._figures.of({**dict(zip(study.varied, values, strict=True)), **outputs})
-        kept = {name: outputs[name][self._points] for name in study.plan.kept}
-        turned = any(np.any(np.abs(outputs[name]) > 0.5 * np.pi) for name in study.angles)
-        return Run(INCOMPLETE if reason else DONE, reason or None, figures, kept, turned)
+        kept = {TIME: plan.times, **{name: outputs[name] for name in plan.kept}}
+        return {
+            **dict(zip(plan.figures, figures, strict=True)),
+            STATUS: INCOMPLETE if reason else DONE,
+            REASON: reason or None,
+            TRAJECTORY: {name: values[self._points] for name, values in kept.items()},
+            TURNED: any(np.any(np.abs(outputs[name]) > 0.5 * np.pi) for name in study.angles),
+        }
 
 
 class Rows(NamedTuple):
@@ -65,23 +66,15 @@ def rows_of(study: Study, first: int, values: Array, found: Sequence[Run], secon
 
     Missing figures are null, because DuckDB and Polars skip it in a median but treat NaN as a large number.
     """
-    plan = study.plan
-    numbers = (*study.varied, *plan.figures)
-    kinds = {RUN: pa.int64(), **dict.fromkeys(numbers, pa.float64()), STATUS: pa.string(), REASON: pa.string()}
-    times = {TIME: plan.times[np.array(plan.kept_points, int)]}
+    plan, numbers = study.plan, dict.fromkeys((*study.varied, *study.plan.figures), pa.float64())
+    kinds = {RUN: pa.int64(), **numbers, STATUS: pa.string(), REASON: pa.string()}
     if plan.kept:
         lists = {TIME: "f8", **{name: study.model.variables[name].dtype for name in plan.kept}}
         kinds[TRAJECTORY] = pa.struct([(name, pa.list_(pa.from_numpy_dtype(kind))) for name, kind in lists.items()])
     rows = [
-        {
-            **dict(zip(numbers, (*own, *run.figures), strict=False)),  # a run that failed has no figures
-            RUN: number,
-            STATUS: run.status,
-            REASON: run.reason,
-            TRAJECTORY: run.kept and {**times, **run.kept},
-        }
+        {RUN: number, **dict(zip(study.varied, own, strict=True)), **run}
         for number, own, run in zip(count(first), values.tolist(), found, strict=False)
     ]
     table = pa.Table.from_pylist(rows, pa.schema(kinds))
-    failed, turned = sum(run.status == FAILED for run in found), sum(run.turned for run in found)
+    failed, turned = sum(run[STATUS] == FAILED for run in found), sum(run.get(TURNED, False) for run in found)
     return Rows(parquet(table, study.about, first), failed, turned, seconds)

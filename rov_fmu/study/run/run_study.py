@@ -1,9 +1,7 @@
 """A study from its plan to its results."""
 
 import re
-import sys
 from collections.abc import Callable
-from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -15,7 +13,7 @@ from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_mod
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
 from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.lanes import do_in_lanes
+from rov_fmu.study.run.local import do_in_lanes, do_in_processes
 from rov_fmu.study.run.system import SystemModel, half_step_words, read_system
 from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.shipped import named_in
@@ -46,21 +44,17 @@ def run_study(
     - `workers`: the number of processes on this machine, or of threads for a vehicle; by default the number of cores.
     - `scheduler`: the address of a Dask scheduler that is used instead.
     - `engine`: "lanes" for a vehicle in this process, the default for a plan with `vehicle` and no scheduler; "fmu" for
-      its FMU on Dask workers. The rows are equal within rounding.
+      its FMU in processes. The rows are equal within rounding.
     - `part`: (3, 64), or "3/64", for the third of 64 parts, which may run beside each other.
     - `merge`: True to do no run, and check that the files of all runs are in `folder`.
     - `on_progress`: called with the state of the runs.
 
         rov_fmu.run_study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
 
-    Dask's workers import the calling script, so a script must call this below `if __name__ == "__main__":`.
-
     Raises FileError with a line for each reason, InputError about an argument, BuildError if a vehicle cannot be
     compiled, StudyError if the workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the
     same call continues from there.
     """
-    if getattr(current_process(), "_inheriting", False):
-        sys.exit(1)  # a worker imports a script without that line; its parent prints the message
     from rov_fmu.study.results.results import Results
 
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "engine": engine, "part": part, "merge": merge}
@@ -113,15 +107,17 @@ def do_study(
         try:
             if work.missing and model.vehicle:
                 do_in_lanes(work, model.vehicle, workers)
-            elif work.missing:
+            elif work.missing and scheduler:
                 from rov_fmu.study.run.cluster import do_on_cluster
 
-                do_on_cluster(work, workers, scheduler)
+                do_on_cluster(work, scheduler)
+            elif work.missing:
+                do_in_processes(work, workers)
         except LoadError as error:
             raise FileError(f"{model.name}: cannot be run: {error}") from error
     if work.turned:
         on_warning(f"in {work.turned} of {work.runs} runs the vehicle turned over: phi or theta passed 90 degrees")
-    if isinstance(model, SystemModel) and work.runs and (words := half_step_words(study, model)):
+    if isinstance(model, SystemModel) and work.runs and (words := half_step_words(study, model, design.rows(0, 1)[0])):
         on_warning(words)
     return work
 

@@ -106,21 +106,16 @@ class SystemSimulator:
             start[component][own] = value
         rows = [self._master.begin(start, plan.step / parts, plan.stop_time, plan.start_time, inputs)]
         rows += self._master.step(plan.steps * parts)[parts - 1 :: parts]
+        self._master.end()
         columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
         has = self._model.variables
         return {
             name: column.astype(has[name].dtype) for name, column in zip(self._study.recorded, columns, strict=True)
         }
 
-    def renew(self) -> None:
-        """End the instances."""
-        self._master.end()
 
-    reset = renew
-
-
-def half_step_words(study: Study, model: SystemModel) -> str:
-    """Return a line about what half the step changes in one run of a study; none if nothing is connected."""
+def half_step_words(study: Study, model: SystemModel, values: Sequence[float]) -> str:
+    """Return a line about what half the step changes in a run with some values; none if nothing is connected."""
     starts = dict.fromkeys(".".join(one.start) for one in model.connections)
     if not (names := [name for name in starts if name in model.variables]):
         return ""
@@ -129,8 +124,7 @@ def half_step_words(study: Study, model: SystemModel) -> str:
         model.unpack(Path(folder))
         try:
             with closing(ChildProcess(SystemSimulator, folder, alike, model, limits=limits)) as child:
-                runs = [child.call("run", study.trials[0], parts) for parts in (1, 2)]
-                child.call("renew")
+                runs = [child.call("run", values, parts) for parts in (1, 2)]
         except (ChildError, RunError) as error:
             who = f"{model.running(folder)} " if isinstance(error, ChildError) else ""
             return f"half the step was tried in one run, which cannot be done: {who}{error}"

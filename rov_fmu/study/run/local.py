@@ -1,9 +1,10 @@
-"""Do the runs of a vehicle in this process, many at once in the vectors of the processor, without an FMU."""
+"""Do the runs of a study on this machine: of a vehicle in this process, or of an FMU or a system in child processes."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import simulate, usable_cores
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import StudyError
 from rov_fmu.study.plan.figures import Array
@@ -23,7 +24,7 @@ from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from rov_fmu.study.run.child import Child
+    from rov_fmu.study.run.child import Children
 
 _AT_ONCE = 4_000_000
 """The number of recorded values that are in memory at a time."""
@@ -31,25 +32,45 @@ _MOST = 10_000
 """The most runs at a time, so that no more than a second of work is lost when the process is killed."""
 
 
+def do_in_processes(work: Work, workers: int | None) -> None:
+    """Do all missing runs, each in one of `workers` child processes. Raises FileError, LoadError, WriteError."""
+    count = workers or usable_cores()
+    with (
+        ExitStack() as stack,
+        ThreadPoolExecutor(count) as pool,  # it ends after its child processes
+        closing(_children(work.study, stack)) as children,
+    ):
+        work.do_tasks(lambda *task: pool.submit(children.rows, *task), lambda: count)
+
+
 def do_in_lanes(work: Work, vehicle: Vehicle, workers: int | None) -> None:
-    """Do all missing runs, with `workers` threads. Raises BuildError, StudyError, WriteError."""
-    began = perf_counter()
+    """Do all missing runs, many at once in the vectors of the processor, with `workers` threads.
+
+    Raises BuildError, StudyError, WriteError.
+    """
     load_library(vehicle, LANES_FILE)
-    work.started = perf_counter() - began
     study = work.study
     most = max(1, min(_MOST, _AT_ONCE // (len(study.recorded) * len(study.plan.times))))
-    with ExitStack() as stack, work.watched():
-        fmu = cache(lambda: stack.enter_context(closing(_fmu(study, vehicle, stack))))
+    work.begin()
+    with ExitStack() as stack:
+        fmu = cache(lambda: stack.enter_context(closing(_children(replace(study, model=vehicle_fmu(vehicle)), stack))))
         while work.missing:
             began = perf_counter()
-            first, end = work.take(most)
-            values = work.design.rows(first, end)
-            found = runs(study, vehicle, values, workers, fmu)
-            work.write((first, end), rows_of(study, first, values, found, perf_counter() - began))
-            work.elapsed += perf_counter() - began
+            span, values = work.take(most)
+            found = runs(study, vehicle, values, workers, lambda rows: fmu().runs(rows))
+            work.write(span, rows_of(study, span[0], values, found, perf_counter() - began))
 
 
-def runs(study: Study, vehicle: Vehicle, values: Array, workers: int | None, fmu: Callable[[], "Child"]) -> list[Run]:
+def _children(study: Study, stack: ExitStack) -> "Children":
+    """Return the child processes of an FMU or a system. Raises FileError."""
+    from rov_fmu.study.run.child import Children
+
+    return Children(study, stack.enter_context(temporary_folder("study-")))
+
+
+def runs(
+    study: Study, vehicle: Vehicle, values: Array, workers: int | None, by_fmu: Callable[[Array], list[Run]]
+) -> list[Run]:
     """Return a run for each row of values. The FMU repeats those whose outputs are not finite, and has the reason."""
     try:
         outputs, ended = simulated(study, vehicle, values, workers)
@@ -60,7 +81,7 @@ def runs(study: Study, vehicle: Vehicle, values: Array, workers: int | None, fmu
     return [
         evaluation.run(row.tolist(), dict(zip(study.recorded, own, strict=True)))
         if does_end
-        else fmu().runs(row[None])[0]  # each has a time limit of its own
+        else by_fmu(row[None])[0]  # each has a time limit of its own
         for row, own, does_end in zip(values, outputs, ended.tolist(), strict=True)
     ]
 
@@ -80,12 +101,3 @@ def simulated(
     found = simulate(vehicle, times, given, study.recorded, vehicles=count, workers=workers, lanes=True, ended=True)
     ended = (found.failed == len(times)) & np.isfinite(found.values).all(axis=(0, 2))
     return found.values.transpose(1, 0, 2), ended
-
-
-def _fmu(study: Study, vehicle: Vehicle, stack: ExitStack) -> "Child":
-    """Return the FMU of a vehicle, built for this machine, in a child process. Raises BuildError, LoadError."""
-    from rov_fmu.study.run.child import Child
-
-    folder = Path(stack.enter_context(temporary_folder("study-")), "fmu")
-    vehicle_fmu(vehicle).unpack(folder)
-    return Child(str(folder), study)
