@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 from typing_extensions import Self
@@ -36,8 +35,6 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 class Study:
     """A plan that fits its FMU: everything that a worker must know, sent to each worker once."""
 
-    key: str
-    """Distinguishes this study from others on the same workers."""
     model: Model
     plan: Plan
     varied: Sequence[str]
@@ -88,8 +85,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
         "groups": design.groups,
         "warnings": [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *design.warnings()],
     }
-    key = f"rov-fmu-{uuid4().hex}"
-    return Study(key, model, plan, design.names, inputs, recorded, angles, about), design
+    return Study(model, plan, design.names, inputs, recorded, angles, about), design
 
 
 def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:

@@ -40,8 +40,7 @@ Span = tuple[int, int]
 
 def parquet(table: pa.Table, study: Mapping[str, Any], first: int) -> bytes:
     """Return the file with the rows of runs from a first one on, which belong to a study."""
-    own, span = _identity(study), (first, first + len(table))
-    about = {"first": span[0], "end": span[1], "study": own}
+    about = {"first": first, "end": first + len(table), "study": {key: study[key] for key in ("plan", "fmu", "engine")}}
     sink = pa.BufferOutputStream()
     told = table.replace_schema_metadata({_ABOUT: json.dumps(about)})
     pq.write_table(told, sink, compression="zstd", write_page_checksum=True)
@@ -186,11 +185,6 @@ def _name(span: Span) -> str:
     return f"part-{span[0]:09d}-{span[1] - 1:09d}.parquet"
 
 
-def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of a study's description that its rows depend on."""
-    return {key: study[key] for key in ("plan", "fmu", "engine")}
-
-
 def _parts(study: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the rows depend on, by the words with which a message tells that it has changed."""
     return {**study["plan"], "--engine": study["engine"], "the vehicle, the FMU or rov-fmu": study["fmu"]}
@@ -203,7 +197,7 @@ def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
             schema, rows = file.schema_arrow, file.read(None if whole else [RUN])[RUN].to_pylist()
         about, has = json.loads(schema.metadata[_ABOUT]), schema.empty_table().flatten().column_names
         span = about["first"], about["end"]
-        old, new = _parts(about["study"]), _parts(_identity(study))
+        old, new = _parts(about["study"]), _parts(study)
         in_order = rows == [*range(span[0], span[0] + len(rows))] and len(rows) == span[1] - span[0]
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         told = brief(reason_of(error).partition("\n")[0].partition(". ")[0])

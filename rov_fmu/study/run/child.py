@@ -4,14 +4,13 @@ import shutil
 import tempfile
 from pathlib import Path
 from threading import get_ident
-from time import perf_counter
 
 from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.study.plan.study import Study
-from rov_fmu.study.run.run import Evaluation, Rows, Run, lost, rows_of
+from rov_fmu.study.run.run import Evaluation, Run, lost
 from rov_fmu.study.run.system import SystemModel, SystemSimulator
 
 _MANY = 10.0
@@ -24,18 +23,12 @@ class Children:
     def __init__(self, study: Study, parent: str) -> None:
         """Unpack the FMU into a new folder in the folder `parent`. Raises FileError."""
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=parent)).absolute()
-        self._study = study.unpacked(self._folder)
+        self.study = study.unpacked(self._folder)
         self._of_threads = dict[int, Child]()
 
     def runs(self, values: Array) -> list[Run]:
         """Run once with each row of values. Raises LoadError."""
-        return self._of_threads.setdefault(get_ident(), Child(self._folder, self._study)).runs(values)
-
-    def rows(self, first: int, values: Array) -> Rows:
-        """Do the runs from number `first` on, one for each row of values. Raises LoadError."""
-        began = perf_counter()
-        found = self.runs(values)
-        return rows_of(self._study, first, values, found, perf_counter() - began)
+        return self._of_threads.setdefault(get_ident(), Child(self._folder, self.study)).runs(values)
 
     def close(self) -> None:
         """End the processes, and remove the folder. Other threads that are doing runs get a LoadError."""

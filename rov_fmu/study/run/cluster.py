@@ -7,6 +7,7 @@ import asyncio
 import logging
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import suppress
+from uuid import uuid4
 
 from distributed import Client, Security, Worker, rpc
 from distributed.diagnostics.plugin import WorkerPlugin
@@ -16,7 +17,7 @@ from rov_fmu.fmus.instance import Array
 from rov_fmu.io.messages import FileError, RovError, StudyError, brief, reason_of
 from rov_fmu.study.plan.study import Study
 from rov_fmu.study.run.child import Children
-from rov_fmu.study.run.run import Rows
+from rov_fmu.study.run.run import Rows, rows_of
 from rov_fmu.study.run.work import Work
 
 _WAIT = 10.0
@@ -30,13 +31,14 @@ def do_on_cluster(work: Work, scheduler: str) -> None:
     """
     _check_scheduler(scheduler)
     with silence_logging_cmgr(logging.CRITICAL), Client(scheduler, timeout=_WAIT, set_as_default=False) as client:
+        key = f"rov-fmu-{uuid4().hex}"
         try:
-            client.register_plugin(Delivery(work.study))
+            client.register_plugin(Delivery(key, work.study))
         except Exception as error:  # whatever a worker may raise
             needs = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
             raise StudyError(f"{needs}: {brief(reason_of(error))}") from error
         work.dashboard = client.dashboard_link or ""
-        pool, key = client.get_executor(pure=False), work.study.key
+        pool = client.get_executor(pure=False)
         try:
             work.do_tasks(lambda *task: pool.submit(do_runs, key, *task), lambda: sum(client.nthreads().values()))
         except RovError:
@@ -72,8 +74,9 @@ def _check_scheduler(scheduler: str) -> None:
 class Delivery(WorkerPlugin):
     """Brings a study to every worker, including those that are started or restarted later."""
 
-    def __init__(self, study: Study) -> None:
-        self.name, self._study = study.key, study
+    def __init__(self, key: str, study: Study) -> None:
+        """`key` distinguishes the study from others on the same workers."""
+        self.name, self._study = key, study
 
     def setup(self, worker: Worker) -> None:
         """Prepare a worker; Dask calls this when the worker starts."""
@@ -91,4 +94,5 @@ _DELIVERED: dict[str, Children] = {}
 
 def do_runs(key: str, first: int, values: Array) -> Rows:
     """Do the runs of a study that this worker has."""
-    return _DELIVERED[key].rows(first, values)
+    children = _DELIVERED[key]
+    return rows_of(children.study, children.runs, first, values)

@@ -1,12 +1,9 @@
 """Do the runs of a study on this machine: of a vehicle in this process, or of an FMU or a system in child processes."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import replace
-from functools import cache
-from time import perf_counter
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,71 +16,67 @@ from rov_fmu.io.messages import StudyError
 from rov_fmu.study.plan.figures import Array
 from rov_fmu.study.plan.model import vehicle_fmu
 from rov_fmu.study.plan.study import Study
+from rov_fmu.study.run.child import Children
 from rov_fmu.study.run.run import Evaluation, Run, rows_of
 from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from rov_fmu.study.run.child import Children
-
 _AT_ONCE = 4_000_000
-"""The number of recorded values that are in memory at a time."""
-_MOST = 10_000
-"""The most runs at a time, so that no more than a second of work is lost when the process is killed."""
+"""The number of recorded values of a task that are in memory at a time."""
 
 
-def do_in_processes(work: Work, workers: int | None) -> None:
-    """Do all missing runs, each in one of `workers` child processes. Raises FileError, LoadError, WriteError."""
-    count = workers or usable_cores()
-    with (
-        ExitStack() as stack,
-        ThreadPoolExecutor(count) as pool,  # it ends after its child processes
-        closing(_children(work.study, stack)) as children,
-    ):
-        work.do_tasks(lambda *task: pool.submit(children.rows, *task), lambda: count)
+def do_here(work: Work, workers: int | None) -> None:
+    """Do all missing runs, with so many threads of a vehicle, or child processes.
 
-
-def do_in_lanes(work: Work, vehicle: Vehicle, workers: int | None) -> None:
-    """Do all missing runs, many at once in the vectors of the processor, with `workers` threads.
-
-    Raises BuildError, StudyError, WriteError.
+    Raises BuildError, FileError, LoadError, StudyError, WriteError.
     """
-    load_library(vehicle, LANES_FILE)
-    study = work.study
-    most = max(1, min(_MOST, _AT_ONCE // (len(study.recorded) * len(study.plan.times))))
-    work.begin()
-    with ExitStack() as stack:
-        fmu = cache(lambda: stack.enter_context(closing(_children(replace(study, model=vehicle_fmu(vehicle)), stack))))
-        while work.missing:
-            began = perf_counter()
-            span, values = work.take(most)
-            found = runs(study, vehicle, values, workers, lambda rows: fmu().runs(rows))
-            work.write(span, rows_of(study, span[0], values, found, perf_counter() - began))
+    study, vehicle = work.study, work.study.model.vehicle
+    threads = 1 if vehicle else workers or usable_cores()
+    with (
+        temporary_folder("study-") as folder,
+        ThreadPoolExecutor(threads) as pool,  # it ends after what its threads wait for
+        closing(Lanes(study, vehicle, folder, workers) if vehicle else Children(study, folder)) as runner,
+    ):
+        most = max(1, _AT_ONCE // (len(study.recorded) * len(study.plan.times)))
+        work.do_tasks(lambda *task: pool.submit(rows_of, study, runner.runs, *task), lambda: threads, most)
 
 
-def _children(study: Study, stack: ExitStack) -> "Children":
-    """Return the child processes of an FMU or a system. Raises FileError."""
-    from rov_fmu.study.run.child import Children
+class Lanes:
+    """The runs of a vehicle in this process, many at once in the vectors of the processor, without an FMU."""
 
-    return Children(study, stack.enter_context(temporary_folder("study-")))
+    def __init__(self, study: Study, vehicle: Vehicle, folder: str, workers: int | None) -> None:
+        """The vehicle's FMU is built in a folder if a run needs it. Raises BuildError."""
+        self._study, self._vehicle, self._folder, self._workers = study, vehicle, folder, workers
+        load_library(vehicle, LANES_FILE)
 
+    def runs(self, values: Array) -> list[Run]:
+        """Run once with each row of values. Raises BuildError, LoadError, StudyError.
 
-def runs(
-    study: Study, vehicle: Vehicle, values: Array, workers: int | None, by_fmu: Callable[[Array], list[Run]]
-) -> list[Run]:
-    """Return a run for each row of values. The FMU repeats those whose outputs are not finite, and has the reason."""
-    try:
-        outputs, ended = simulated(study, vehicle, values, workers)
-    except MemoryError as error:
-        needs = "the outputs of a run need more than the available memory: use longer steps, or keep fewer outputs"
-        raise StudyError(needs) from error
-    evaluation = Evaluation(study)
-    return [
-        evaluation.run(row.tolist(), dict(zip(study.recorded, own, strict=True)))
-        if does_end
-        else by_fmu(row[None])[0]  # each has a time limit of its own
-        for row, own, does_end in zip(values, outputs, ended.tolist(), strict=True)
-    ]
+        The FMU repeats the runs whose outputs are not finite, and has the reason.
+        """
+        study = self._study
+        try:
+            outputs, ended = simulated(study, self._vehicle, values, self._workers)
+        except MemoryError as error:
+            needs = "the outputs of a run need more than the available memory: use longer steps, or keep fewer outputs"
+            raise StudyError(needs) from error
+        evaluation = Evaluation(study)
+        return [
+            evaluation.run(row.tolist(), dict(zip(study.recorded, own, strict=True)))
+            if does_end
+            else self.fmu.runs(row[None])[0]  # each has a time limit of its own
+            for row, own, does_end in zip(values, outputs, ended.tolist(), strict=True)
+        ]
+
+    @cached_property
+    def fmu(self) -> Children:
+        """The vehicle's FMU, built for this machine."""
+        return Children(replace(self._study, model=vehicle_fmu(self._vehicle)), self._folder)
+
+    def close(self) -> None:
+        """End the process of the FMU, if it was needed."""
+        if "fmu" in vars(self):
+            self.fmu.close()
 
 
 def simulated(

@@ -1,7 +1,8 @@
 """What runs give: figures, kept outputs, how they ended, and their rows as a Parquet file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,8 +62,8 @@ class Rows(NamedTuple):
     """The time that the runs took."""
 
 
-def rows_of(study: Study, first: int, values: Array, found: Sequence[Run], seconds: float) -> Rows:
-    """Return the rows of runs from number `first` on, with the varied values of each.
+def rows_of(study: Study, runs: Callable[[Array], Sequence[Run]], first: int, values: Array) -> Rows:
+    """Do the runs from number `first` on, one for each row of values, and return their rows.
 
     Missing figures are null, because DuckDB and Polars skip it in a median but treat NaN as a large number.
     """
@@ -71,6 +72,9 @@ def rows_of(study: Study, first: int, values: Array, found: Sequence[Run], secon
     if plan.kept:
         lists = {TIME: "f8", **{name: study.model.variables[name].dtype for name in plan.kept}}
         kinds[TRAJECTORY] = pa.struct([(name, pa.list_(pa.from_numpy_dtype(kind))) for name, kind in lists.items()])
+    began = perf_counter()
+    found = runs(values)
+    seconds = perf_counter() - began
     rows = [
         {RUN: number, **dict(zip(study.varied, own, strict=True)), **run}
         for number, own, run in zip(count(first), values.tolist(), found, strict=False)

@@ -13,7 +13,7 @@ from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_mod
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
 from rov_fmu.study.plan.study import prepare
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.local import do_in_lanes, do_in_processes
+from rov_fmu.study.run.local import do_here
 from rov_fmu.study.run.system import SystemModel, half_step_words, read_system
 from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.shipped import named_in
@@ -105,14 +105,12 @@ def do_study(
             store.check_complete(study.about)
         work = Work(study, design, store, missing, span[1] - span[0], on_progress)
         try:
-            if work.missing and model.vehicle:
-                do_in_lanes(work, model.vehicle, workers)
-            elif work.missing and scheduler:
+            if missing and scheduler:
                 from rov_fmu.study.run.cluster import do_on_cluster
 
                 do_on_cluster(work, scheduler)
-            elif work.missing:
-                do_in_processes(work, workers)
+            elif missing:
+                do_here(work, workers)
         except LoadError as error:
             raise FileError(f"{model.name}: cannot be run: {error}") from error
     if work.turned:

@@ -2,7 +2,7 @@
 component.variable."""
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
 from rov_fmu.bridges.system.ssp import read_ssp
 from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import RunError
 from rov_fmu.fmus.unpacking import unpack_fmu
-from rov_fmu.fmus.variable import Value
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.reading import read_bytes
@@ -31,21 +30,18 @@ from rov_fmu.study.plan.study import Study
 class SystemModel(Model):
     """A system, whose content is that of the SSP."""
 
-    sources: Mapping[str, str]
-    """The path of the FMU of each component in the SSP."""
-    values: Mapping[str, Mapping[str, Value]]
-    """The start values of each component."""
-    connections: Sequence[Connection]
+    structure: SystemStructure
+    """What it has beside its FMUs: their paths in the SSP, start values and connections."""
 
     def unpack(self, folder: Path) -> None:
         """Unpack the FMU of each component into a folder of its own. Raises FileError."""
         with zipfile.ZipFile(BytesIO(self.content)) as archive:  # read_ssp has checked it
-            for name, own in folders_of(folder, self.sources).items():
-                unpack_fmu(BytesIO(archive.read(self.sources[name])), Path(f"{self.name}: {name}"), own)
+            for name, own in folders_of(folder, self.structure.sources).items():
+                unpack_fmu(BytesIO(archive.read(self.structure.sources[name])), Path(f"{self.name}: {name}"), own)
 
     def running(self, folder: str) -> str:
         """Return the component that a process ran which did not return."""
-        return busy(folder, self.sources)
+        return busy(folder, self.structure.sources)
 
 
 def split(name: str) -> Name:
@@ -72,14 +68,8 @@ def read_system(path: Path) -> SystemModel:
                 can_be_set=own.can_be_set and not is_connected,
                 causality="connected" if is_connected else own.causality,
             )
-    return SystemModel(
-        name=path.name,
-        content=read_bytes(path),
-        variables=variables,
-        sources=system.sources,
-        values=system.values,
-        connections=system.connections,
-    )
+    structure = replace(system, parts={})
+    return SystemModel(name=path.name, content=read_bytes(path), variables=variables, structure=structure)
 
 
 # ---- Its runs --------------------------------------------------------------------------------------------------------
@@ -89,8 +79,8 @@ class SystemSimulator:
     """An unpacked system, in a process of its own, with new instances for each run."""
 
     def __init__(self, folder: str, study: Study, model: SystemModel) -> None:
-        self._study, self._model = study, model
-        self._master = Master(folder, [*model.sources], model.connections, [split(name) for name in study.recorded])
+        self._study, self._model, system = study, model, model.structure
+        self._master = Master(folder, [*system.sources], system.connections, [split(name) for name in study.recorded])
 
     def run(self, values: Sequence[float], parts: int = 1) -> dict[str, npt.NDArray[Any]]:
         """Run once and return every recorded variable at every communication point. Raises RunError.
@@ -100,23 +90,20 @@ class SystemSimulator:
         """
         plan = self._study.plan
         inputs = {split(name): np.repeat(signal, parts) for name, signal in self._study.inputs.items()}
-        start = {component: dict(own) for component, own in self._model.values.items()}
+        start = {component: dict(own) for component, own in self._model.structure.values.items()}
         for name, value in {**plan.set, **dict(zip(self._study.varied, values, strict=True))}.items():
             component, own = split(name)
             start[component][own] = value
         rows = [self._master.begin(start, plan.step / parts, plan.stop_time, plan.start_time, inputs)]
         rows += self._master.step(plan.steps * parts)[parts - 1 :: parts]
         self._master.end()
-        columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
-        has = self._model.variables
-        return {
-            name: column.astype(has[name].dtype) for name, column in zip(self._study.recorded, columns, strict=True)
-        }
+        columns, has = zip(*rows, strict=True), self._model.variables
+        return {name: np.array(own, has[name].dtype) for name, own in zip(self._study.recorded, columns, strict=True)}
 
 
 def half_step_words(study: Study, model: SystemModel, values: Sequence[float]) -> str:
     """Return a line about what half the step changes in a run with some values; none if nothing is connected."""
-    starts = dict.fromkeys(".".join(one.start) for one in model.connections)
+    starts = dict.fromkeys(".".join(one.start) for one in model.structure.connections)
     if not (names := [name for name in starts if name in model.variables]):
         return ""
     alike, limits = replace(study, recorded=names), budget(2.0 * study.plan.time_limit)

@@ -20,6 +20,8 @@ _TASK = 1.0
 """The seconds that a task should take."""
 _LEAST = 0.2
 """The least seconds of a task, also when few runs remain."""
+_MOST = 10_000
+"""The most runs of a task, so that no more than a second of work is lost when the process is killed."""
 _AHEAD = 3
 """The number of tasks submitted for each thread, so that no thread waits for the next one."""
 
@@ -46,63 +48,60 @@ class Work:
         on_progress: Callable[[StudyProgress], None],
     ) -> None:
         """`total` is the number of runs with those that are done."""
-        self.study, self.design, self.store = study, design, store
-        self.missing, self._total, self._on_progress = deque(missing), total, on_progress
-        self._done_before, self._made = total - self.left, perf_counter()
+        self.study, self._design, self.store = study, design, store
+        self._missing, self._total, self._on_progress = deque(missing), total, on_progress
+        self._done_before, self._made = total - self._left, perf_counter()
 
     @property
-    def left(self) -> int:
+    def _left(self) -> int:
         """The number of runs that nobody has begun."""
-        return sum(end - first for first, end in self.missing)
+        return sum(end - first for first, end in self._missing)
 
-    def begin(self) -> None:
-        """Say that the first run can begin."""
-        self.started = perf_counter() - self._made
-        self._report()
-
-    def take(self, most: int) -> tuple[Span, Array]:
-        """Take consecutive runs from those that are missing, with their rows of values."""
-        first, end = self.missing.popleft()
-        if end - first > most:
-            self.missing.appendleft((first + most, end))
-            end = first + most
-        return (first, end), self.design.rows(first, end)
-
-    def write(self, span: Span, rows: Rows) -> None:
-        """Keep the rows of runs. Raises WriteError."""
-        self.store.write(span, rows.content)
-        self.runs += span[1] - span[0]
-        self.failed += rows.failed
-        self.turned += rows.turned
-        self.elapsed = perf_counter() - self._made - self.started
-        self._report()
-
-    def do_tasks(self, submit: Callable[[int, Array], "Future[Rows]"], threads: Callable[[], int]) -> None:
+    def do_tasks(
+        self, submit: Callable[[int, Array], "Future[Rows]"], threads: Callable[[], int], most: int = _MOST
+    ) -> None:
         """Do the missing runs in tasks of about a second, and write the rows of each task as it ends.
 
-        `submit` gives the runs from a first one on to one of the threads, whose present number `threads` returns.
+        `submit` gives the runs from a first one on to one of the threads, whose present number `threads` returns. A
+        task has at most so many runs.
         Raises LoadError, StudyError, WriteError, and what a connection to threads elsewhere raises.
         """
         seconds = _TASK  # of a run, by the last task; the first tasks have one run each
         spans = dict["Future[Rows]", Span]()
-        self.begin()
+        self.started = perf_counter() - self._made
+        self._report()
         try:
-            while self.missing or spans:
+            while self._missing or spans:
                 count = threads()
-                while self.missing and len(spans) < _AHEAD * (count or 1):
-                    size = min(ceil(_TASK / seconds), ceil(self.left / (count or 1)))
-                    span, values = self.take(max(size, ceil(_LEAST / seconds)))
-                    spans[submit(span[0], values)] = span
+                while self._missing and len(spans) < _AHEAD * (count or 1):
+                    size = max(min(ceil(_TASK / seconds), ceil(self._left / (count or 1))), ceil(_LEAST / seconds))
+                    first, end = self._take(min(size, most, _MOST))
+                    spans[submit(first, self._design.rows(first, end))] = first, end
                 done, _ = wait(spans, _WATCH, FIRST_COMPLETED)
                 for future in done:
                     rows, span = _result(future), spans.pop(future)
-                    self.write(span, rows)
+                    self._write(span, rows)
                     seconds = max(rows.seconds / (span[1] - span[0]), 1e-6)
                 if not done:
                     self._report(has_workers=count > 0)
         finally:
             for future in spans:
                 future.cancel()
+
+    def _take(self, most: int) -> Span:
+        """Take consecutive runs from those that are missing."""
+        first, end = self._missing.popleft()
+        if end - first > most:
+            self._missing.appendleft((first + most, end))
+        return first, min(end, first + most)
+
+    def _write(self, span: Span, rows: Rows) -> None:
+        self.store.write(span, rows.content)
+        self.runs += span[1] - span[0]
+        self.failed += rows.failed
+        self.turned += rows.turned
+        self.elapsed = perf_counter() - self._made - self.started
+        self._report()
 
     def _report(self, *, has_workers: bool = True) -> None:
         """Tell the progress."""
