@@ -13,7 +13,6 @@ Its import raises InputError where foxglove-sdk is not installed.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from math import inf
 
@@ -22,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import UPWARD
+from rov_fmu.equation.catalogue import UPWARD, Declaration
 from rov_fmu.io.messages import InputError
 from rov_fmu.report.plots.geometry import hull_size, thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -64,16 +63,6 @@ _HULL, _JET = (0.93, 0.69, 0.13, 0.8), (0.34, 0.71, 0.91, 0.9)
 """The colours of the hull and of the jets: red, green, blue and opacity."""
 
 
-@dataclass(frozen=True)
-class NumberField:
-    """A number in the messages of a topic."""
-
-    unit: str
-    """The SI unit."""
-    words: str
-    """What it is."""
-
-
 class Recording:
     """An MCAP file in memory."""
 
@@ -84,13 +73,13 @@ class Recording:
         self._writer = open_mcap(self._stream, context=self.context, writer_options=options)
         self._writer.write_metadata("vehicle", dict(about))
 
-    def topic(self, name: str, numbers: Mapping[str, NumberField]) -> Callable[[int, Mapping[str, float]], None]:
+    def topic(self, name: str, numbers: Mapping[str, Declaration]) -> Callable[[int, Mapping[str, float]], None]:
         """Return the function that writes a message of a topic with numbers by name, at a time in ns."""
         schema = {
             "title": name.removeprefix("/"),
             "type": "object",
             "properties": {
-                key: {"type": "number", "unit": number.unit, "description": f"{number.words} [{number.unit}]"}
+                key: {"type": "number", "unit": number.unit, "description": f"{number.description} [{number.unit}]"}
                 for key, number in numbers.items()
             },
         }
@@ -131,8 +120,7 @@ def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> b
     layout = vehicle.layout
     groups = {"/inputs": layout.inputs, "/outputs": layout.state | layout.calculated}
     numbers = {
-        topic: {name: NumberField(of.unit, of.description) for name, of in declared.items() if name in values}
-        for topic, declared in groups.items()
+        topic: {name: of for name, of in declared.items() if name in values} for topic, declared in groups.items()
     }
     write = {topic: recording.topic(topic, own) for topic, own in numbers.items() if own}
     write_picture, write_pose = _picture_writer(vehicle, values, recording.context), recording.poses("/pose", values)

@@ -8,10 +8,10 @@ from math import isnan, nan
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.bridges.mcap import NumberField, Recording, about_vehicle, nanoseconds
+from rov_fmu.bridges.mcap import Recording, about_vehicle, nanoseconds
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW, Declaration
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
 from rov_fmu.io.file_kinds import IDENTIFIED
 from rov_fmu.io.groups import grouped
@@ -30,7 +30,7 @@ class _Series:
     """n: s."""
     columns: Mapping[str, Array]
     """The n values of each number; NaN where there is none."""
-    numbers: Mapping[str, NumberField]
+    numbers: Mapping[str, Declaration]
 
 
 def identification_mcap(identification: Identification) -> bytes:
@@ -98,14 +98,14 @@ def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
 def _commands(commands: Commands) -> _Series:
     time = np.unique(commands.time)
     numbers = {
-        name: NumberField("1", f"Command of {name}, a fraction of the full command") for name in commands.thrusters
+        name: Declaration("1", f"Command of {name}, a fraction of the full command") for name in commands.thrusters
     }
     return _Series("commands", time, dict(zip(numbers, commands.at(time).T, strict=True)), numbers)
 
 
 def _measured(channel: Channel) -> _Series:
     name, (time, values) = channel.quantity.name, channel.samples
-    numbers = {"measured": NumberField(channel.quantity.unit, f"Measured {name}")}
+    numbers = {"measured": Declaration(channel.quantity.unit, f"Measured {name}")}
     return _Series(topic_name(name), time, {"measured": values}, numbers)
 
 
@@ -124,8 +124,8 @@ def _prediction(parts: Sequence[Prediction], channel: Channel | None) -> _Series
         key: np.append(values, none) for key, values in ({"predicted": predicted} | ends).items()
     }
     numbers = {
-        "measured": NumberField(unit, f"Measured {name}"),
-        "predicted": NumberField(unit, f"The prediction of the {name} by {parts[0].by}"),
+        "measured": Declaration(unit, f"Measured {name}"),
+        "predicted": Declaration(unit, f"The prediction of the {name} by {parts[0].by}"),
         **_edges(unit, f"95 % band of the measured {name}"),
     }
     return _Series(topic_name(name), time[order], {key: values[order] for key, values in columns.items()}, numbers)
@@ -136,7 +136,7 @@ def _unknown(unknown: UnknownForce) -> _Series:
     columns = {"force": unknown.force, **_band(unknown.force, unknown.deviation)}
     words = f"Slow {'torque' if axis.is_rotation else 'force'} in {axis.name} that the model does not explain"
     numbers = {
-        "force": NumberField(axis.load, f"{words}, positive {axis.positive}"),
+        "force": Declaration(axis.load, f"{words}, positive {axis.positive}"),
         **_edges(axis.load, "95 % interval"),
     }
     return _Series(f"unknown_force/{axis.name}", unknown.time, columns, numbers)
@@ -146,5 +146,5 @@ def _band(values: Array, deviation: Array) -> dict[str, Array]:
     return {"low": values - NORMAL * deviation, "high": values + NORMAL * deviation}
 
 
-def _edges(unit: str, words: str) -> dict[str, NumberField]:
-    return {end: NumberField(unit, f"{end.capitalize()} end of the {words}") for end in ("low", "high")}
+def _edges(unit: str, words: str) -> dict[str, Declaration]:
+    return {end: Declaration(unit, f"{end.capitalize()} end of the {words}") for end in ("low", "high")}

@@ -10,6 +10,7 @@ from lxml import html
 
 from rov_fmu.bridges import mcap
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import Declaration
 from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -146,7 +147,7 @@ def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, r
 @pytest.fixture
 def identified(csv: Path, tmp_path: Path) -> Path:
     """What `identify --mcap` writes: a band of the depth from 5 s on, and the unknown force of heave."""
-    number = mcap.NumberField("m", "a number")
+    number = Declaration("m", "a number")
     written = mcap.Recording({"name": "VideoRay"})
     name = topic_name(csv.name)
     depth = written.topic(f"/{name}/depth", dict.fromkeys(("measured", "predicted", "low", "high"), number))
