@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from io import StringIO
 from itertools import count, takewhile
 from math import cos, inf, pi, sin
 from pathlib import Path
@@ -23,6 +22,7 @@ from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.io.columns import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
+from rov_fmu.io.numbers import csv_of
 from rov_fmu.io.output import Output, is_same, write_whole
 from rov_fmu.tank.readers.ardusub_frames import Servos, impossible_of, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -129,11 +129,9 @@ class FlightLog:
         """
         if is_mcap(path):
             return write_whole(Output(path, self._mcap()), force=True)
-        text, width = StringIO(), len(self._titles)
-        print(*self._titles, sep=",", file=text)
-        for first in range(0, len(self._rows), width):
-            print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
-        return write_whole(Output(path, text.getvalue().encode()), force=True)
+        width = len(self._titles)
+        rows = (self._rows[first : first + width] for first in range(0, len(self._rows), width))
+        return write_whole(Output(path, csv_of(self._titles, rows, "{:.9g}".format).encode()), force=True)
 
     def _mcap(self) -> bytes:
         """Return all complete rows as the content of an MCAP file."""

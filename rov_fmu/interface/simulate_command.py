@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO, StringIO
+from io import BytesIO
 from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
 from tempfile import mkdtemp
@@ -15,6 +15,7 @@ from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, print_message, shown, wrapped
+from rov_fmu.io.numbers import csv_of
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 from rov_fmu.vehicle.shipped import shipped_name
@@ -248,11 +249,8 @@ def _table_output(result: Result, path: Path) -> Output:
                 f"--output {path}: Parquet needs pandas and pyarrow: pip install pandas pyarrow"
             ) from error
         return Output(path, content)
-    text = StringIO()
-    text.write(f"{','.join([TIME, *result.names])}\n")
-    for row in zip(result.time.tolist(), *(values.tolist() for values in result.values()), strict=True):
-        text.write(f"{','.join(map(repr, row))}\n")
-    return Output(path, text.getvalue().encode())
+    rows = zip(result.time.tolist(), *(values.tolist() for values in result.values()), strict=True)
+    return Output(path, csv_of([TIME, *result.names], rows).encode())
 
 
 def _plot_output(result: Result, path: Path, title: str) -> Output:

@@ -1,5 +1,6 @@
 """Numbers as text, with the digits that their intervals or their readers need, and the numbers that arguments take."""
 
+from collections.abc import Callable, Iterable
 from decimal import Decimal
 from math import floor, inf, isfinite, log10, nextafter
 from numbers import Real
@@ -76,6 +77,11 @@ TOLERANCES = NumberRange("a number above 0", ABOVE_0)
 def significant(number: float, digits: int) -> str:
     """Return a number as text with `digits` significant digits: 0.30, 420."""
     return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
+
+
+def csv_of(names: Iterable[str], rows: Iterable[Iterable[float]], number: Callable[[float], str] = repr) -> str:
+    """Return rows of numbers as a CSV file with the names above. By default each number has all its digits."""
+    return "".join(",".join(line) + "\n" for line in (names, *(map(number, row) for row in rows)))
 
 
 def percent(share: float) -> str:

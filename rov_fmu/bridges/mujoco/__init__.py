@@ -32,6 +32,7 @@ from rov_fmu.equation.catalogue import UPWARD
 from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import csv_of
 from rov_fmu.report.plots.geometry import hull_size, thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -136,7 +137,7 @@ def mujoco_texts(
         **water_sources(layout),
     }
     rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
-    files["draws.csv"] = "\n".join([",".join(draws), *(",".join(map(repr, row)) for row in rows), ""])
+    files["draws.csv"] = csv_of(draws, rows)
     return files
 
 

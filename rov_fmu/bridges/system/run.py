@@ -21,6 +21,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, Progress, silent
+from rov_fmu.io.numbers import csv_of
 from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes, svg_file
 
 _COLORS = (*LINES, "grey")
@@ -121,9 +122,8 @@ def run_system(
 def system_csv(read: Sequence[Name], step: float, rows: Array, half: HalfStep | None = None) -> bytes:
     """Return the rows as CSV, with the time first, and at the end what half the step changes."""
     columns = [[n * step for n in range(len(rows))], *rows.T.tolist(), *([half.shares.tolist()] if half else [])]
-    header = ",".join(["time", *map(".".join, read), *(["half_step"] if half else [])])
-    lines = (",".join(map(repr, row)) for row in zip(*columns, strict=True))
-    return "\n".join([header, *lines, ""]).encode()
+    names = ["time", *map(".".join, read), *(["half_step"] if half else [])]
+    return csv_of(names, zip(*columns, strict=True)).encode()
 
 
 def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
