@@ -29,8 +29,9 @@ from tests.conftest import Made, unzipped, without_page
 from tests.fmi import OK
 from tests.fmu.calls.test_arguments import STOPS
 from tests.vehicles import HEAVY, SIX, THRUST_EFFECTS, a_vehicle, passed, pulsed, random_inputs
+from verification.references import fmpy_slave
 from verification.references.c_programs import Ended, compile_c, run_program
-from verification.references.fmpy_slave import fmpy_slave, keep_loaded
+from verification.references.fmpy_slave import keep_loaded
 
 
 @pytest.fixture(scope="session")
@@ -51,7 +52,7 @@ def python_dir(python_fmu: Path) -> Path:
 
 
 def _instance(folder: Path) -> FMU2Slave:
-    slave = fmpy_slave(folder)
+    slave: FMU2Slave = fmpy_slave.Slave(folder).fmu
     slave.setupExperiment(startTime=0.0)
     return slave
 

@@ -23,7 +23,7 @@ from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.report.conftest import Visit, chart, flown_vehicle, get, until
-from verification.references.fmpy_slave import fmpy_slave
+from verification.references.fmpy_slave import Slave
 
 pytestmark = pytest.mark.interop
 
@@ -66,22 +66,18 @@ def a_manoeuvre(vehicle: Vehicle, longest: float) -> list[dict[str, Any]]:
 
 def natively(folder: Path, vehicle: Vehicle, legs: list[dict[str, Any]]) -> Iterator[list[float]]:
     """Yield all variables after each leg, computed by the FMU's binary."""
-    reference = {v.name: v.value_reference for v in variables(vehicle)}
-    slave = fmpy_slave(folder)
+    slave = Slave(folder)
     try:
-        slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
+        slave.initialize({})
         time = 0.0
         for leg in legs:
             for given in (leg["tuning"], leg["inputs"]):
-                slave.setReal([reference[name] for name in given], list(given.values()))
-            slave.doStep(time, leg["length"])
+                slave.put(given)
+            slave.step(time, leg["length"])
             time += leg["length"]
-            yield slave.getReal([*reference.values()])
+            yield slave.get(*(v.name for v in variables(vehicle)))
     finally:
-        slave.terminate()
-        slave.freeInstance()
+        slave.end()
 
 
 def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path, longest: float = 5.0) -> None:

@@ -83,8 +83,8 @@ class Measured:
         """Return the median ratio of the costs of two jobs."""
         return float(np.median(self.seconds[job] / self.seconds[other]))
 
-    def cost_at(self, jobs: Sequence[Job], target: float = TARGET) -> Reals:
-        """Return the seconds at which a method reaches an error, in each repetition.
+    def cost_at_target(self, jobs: Sequence[Job]) -> Reals:
+        """Return the seconds at which a method reaches the error TARGET, in each repetition.
 
         The cost is interpolated between settings, on logarithmic axes. A setting is left out if another one is as exact
         and cheaper.
@@ -94,12 +94,12 @@ class Measured:
         exact_first = np.argsort(errors)
         typical = np.median(costs, axis=1)[exact_first]
         best = exact_first[typical <= np.minimum.accumulate(typical)]
-        log_costs = (np.interp(np.log(target), np.log(errors[best]), row) for row in np.log(costs[best]).T)
+        log_costs = (np.interp(np.log(TARGET), np.log(errors[best]), row) for row in np.log(costs[best]).T)
         return np.exp([*log_costs])
 
-    def compared(self, jobs: Sequence[Job], ours: Job, target: float = TARGET) -> tuple[float, float]:
-        """Return the median seconds of a method at an error, and their ratio to ours."""
-        costs = self.cost_at(jobs, target)
+    def compared(self, jobs: Sequence[Job], ours: Job) -> tuple[float, float]:
+        """Return the median seconds of a method at the error TARGET, and their ratio to ours."""
+        costs = self.cost_at_target(jobs)
         return float(np.median(costs)), float(np.median(costs / self.seconds[ours]))
 
 
@@ -121,9 +121,9 @@ class Table:
             for h in H
         }
 
-    def sweep(self, method: str, settings: Sequence[float], h: float = 1.0) -> list[Job]:
-        """Return the jobs of a method with several settings, in steps of h s."""
-        return [Job(method, setting, self.jobs[CORE, h].work, h) for setting in settings]
+    def sweep(self, method: str, settings: Sequence[float]) -> list[Job]:
+        """Return the jobs of a method with several settings, in steps of 1 s."""
+        return [Job(method, setting, self.jobs[CORE, 1.0].work, 1.0) for setting in settings]
 
     def section(self, measured: Measured) -> Section:
         """Return the cost and the error of a step by each method, and what heyoka costs relative to ours."""

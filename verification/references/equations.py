@@ -169,25 +169,24 @@ def _interpolated(table: CommandTable, command: Number, numbers: Any) -> Number:
 
 def rotor_speed(rov: Vehicle, curve: Curve, command: Number, numbers: Any) -> Number:
     """Return the steady speed of a rotor under a command: what is beyond the dead band, with the command's sign."""
-    key = f"c_0_{curve.name}"
-    dead_band = rov.coefficients.get(f"{key}_reverse" if command < 0 and "c_0_reverse" in curve.keys else key, 0.0)
-    beyond = max(abs(command) - numbers.mpf(dead_band), numbers.zero)
+    beyond = max(abs(command) - of_direction(rov, curve, "c_0", command, numbers), numbers.zero)
     return -beyond if command < 0 else beyond
 
 
 def _quadratic(rov: Vehicle, curve: Curve, command: Number, numbers: Any) -> Number:
     """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
-    keys, reverse = curve.keys, "_reverse" if command < 0 else ""
-
-    def number(key: str) -> Number:
-        name = f"{key}_{curve.name}{reverse}" if key + reverse in keys else f"{key}_{curve.name}"
-        return numbers.mpf(rov.coefficients[name])
-
-    beyond = abs(command) - (number("c_0") if "c_0" in keys else 0)
+    c_0, a, b = (of_direction(rov, curve, key, command, numbers) for key in ("c_0", "a_t", "b_t"))
+    beyond = abs(command) - c_0
     if beyond <= 0:
         return numbers.zero
-    size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.n_thrusters
-    return -size if reverse else size
+    size = (a * beyond**2 + b * beyond) / curve.n_thrusters
+    return -size if command < 0 else size
+
+
+def of_direction(rov: Vehicle, curve: Curve, key: str, command: Number, numbers: Any) -> Number:
+    """Return a coefficient of a curve for the sign of a command; 0 if the curve does not have it."""
+    astern = "_reverse" if command < 0 and f"{key}_reverse" in curve.keys else ""
+    return numbers.mpf(rov.coefficients.get(f"{key}_{curve.name}{astern}", 0.0))
 
 
 def commands(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[str, Number]:

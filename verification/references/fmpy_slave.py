@@ -66,11 +66,6 @@ class Slave:
         self.fmu.freeInstance()
 
 
-def fmpy_slave(folder: Path, callbacks: Any = None) -> FMU2Slave:
-    """Return FMPy's own instance of an unzipped FMU of FMI 2.0. With callbacks, logging is on."""
-    return Slave(folder, callbacks=callbacks, loggingOn=callbacks is not None).fmu
-
-
 def keep_loaded(folder: Path) -> None:
     """Keep the library of a PythonFMU FMU loaded: loading it a second time may crash the Python interpreter."""
     for library in (folder / "binaries" / fmpy.platform).iterdir():

@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import cross_name
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body
-from .equations import commands, of_voltage, rotor_speed, steady_forces
+from .equations import commands, of_direction, of_voltage, rotor_speed, steady_forces
 from .extrapolation import BITS, plain, real, until_reversal
 from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, of_point, rigid_body_mass, rotation, skew
 
@@ -100,8 +100,7 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
     for thruster, (name, command) in zip(rov.layout.thrusters, commands(rov, inputs, mp).items(), strict=True):
         curve = rov.layout.curve_of[name]
         assert thruster.position
-        reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
-        loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
+        loss = of_direction(rov, curve, "d", command, mp)
         loss *= of_voltage(rov, curve, inputs.get("voltage", 0), mp, power=1)
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
         wrench = _wrench(thruster.place, thruster.direction.value)
@@ -115,11 +114,11 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
 def _rotors(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> tuple[Array, Array]:
     """Return a, b and d of each rotor whose speed lags, ahead and astern, and which thrusters have one."""
     curves, k, rows = rov.layout.curve_of, rov.coefficients, []
-    for end in ("", "_reverse"):
+    for sign in (1, -1):
         for key in ("a_t", "b_t", "d"):
             row = []
             for name, curve in curves.items():
-                value = mp.mpf(k.get(f"{key}_{curve.name}{end}", k.get(f"{key}_{curve.name}", 0.0)))
+                value = of_direction(rov, curve, key, sign, mp)
                 value *= of_voltage(rov, curve, inputs.get("voltage", 0), mp, power=1 if key == "d" else 2)
                 row.append(number(mp.mpf(k[f"health_{name}"]) * value / curve.n_thrusters))
             rows.append(row)

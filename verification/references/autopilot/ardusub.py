@@ -4,7 +4,7 @@ It follows ArduPilot's sources: `AP_Motors6DOF.cpp` (the factors of the frame `v
 `AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp` (the cascades). It leaves out the filter that estimates
 the state, and the shaping of targets; `flights.py` flies it with noisy estimates, and writes logs. `Hold.by` has other
 gains, and the filters of the sensors. It shares no code with `rov_fmu/bridges/ardusub/`, which makes such gains.
-`fmu_src/live/hold.js`, of the page that flies, is the same law in JavaScript, and the tests compare the two.
+`fmu_src/autopilot/` has these loops in C, and the tests compare the two.
 """
 
 from collections.abc import Mapping
