@@ -12,10 +12,9 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, redirect_stdout, suppress
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -33,75 +32,9 @@ STEPS = 30
 """The number of steps of a run."""
 _SHORTEST, _LONGEST = -4.0, 3.0
 """The decimal logarithms of the shortest and the longest step (s)."""
-_SAVE, _RESTORE = "save", "restore"
+_SAVE, _RESTORE = 0.07, 0.08
+"""How often the state is saved before a step, and how often the saved one is restored."""
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step of a run."""
-
-    values: Mapping[str, float]
-    """What is set before the step."""
-    length: float
-    """s."""
-    action: str
-    """Whether the state is saved before the step, or the saved one is restored."""
-    seed: Sequence[float]
-    """The direction of the derivative after the step, in the space of the inputs."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """A random run."""
-
-    start: Mapping[str, float]
-    """What is set before the initialization: parameters, states and inputs."""
-    seed: Sequence[float]
-    """The direction of the derivative at the start."""
-    steps: Sequence[Step]
-
-
-def random_runs(description: Any, count: int) -> Iterator[Run]:
-    """Draw runs for the variables of an FMU. They are the same in every process."""
-    draw = np.random.default_rng(40)
-    variables = {v.name: v for v in description.modelVariables}
-    parameters = [name for name, v in variables.items() if v.causality == "parameter"]
-    inputs = [name for name, v in variables.items() if v.causality == "input"]
-    tunable = [name for name in parameters if variables[name].variability == "tunable"]
-    states = [unknown.variable.derivative.name for unknown in description.derivatives]
-    states = [name for name in states if variables[name].initial == "exact"]
-
-    def one(name: str) -> float:
-        """Draw a value of a variable within its bounds."""
-        variable = variables[name]
-        stated = variable.declaredType or variable  # FMI 3.0 has the bounds in the type
-        low, high = float(stated.min or -np.inf), float(stated.max or np.inf)
-        start = float(variable.start or 0.0)
-        if np.isfinite(high - low) and name in inputs:  # commands, which saturate
-            return draw.uniform(1.1 * low, 1.1 * high)
-        if name not in parameters:
-            return start + 2.0 * float(stated.nominal or 1.0) * draw.normal()
-        value = start * np.exp(0.3 * draw.normal()) if start else draw.normal()
-        return float(np.clip(value, low, high))
-
-    def some(share: float, names: Sequence[str]) -> dict[str, float]:
-        """Draw values of a share of the variables. A third of those of inputs are zero."""
-        chosen = [name for name in names if draw.random() < share]
-        return {name: 0.0 if name in inputs and draw.random() < 0.3 else one(name) for name in chosen}
-
-    def seed() -> list[float]:
-        return [float(x) for x in draw.normal(size=len(inputs))]
-
-    def step() -> Step:
-        tuned = some(0.3, tunable) if draw.random() < 0.1 else {}
-        length = 10.0 ** draw.uniform(_SHORTEST, _LONGEST)
-        action = str(draw.choice(["", _SAVE, _RESTORE], p=[0.85, 0.07, 0.08]))
-        return Step(tuned | some(0.7, inputs), length, action, seed())
-
-    for _ in range(count):
-        own = some(0.2, parameters) if draw.random() < 0.5 else {}  # else those of the vehicle file
-        yield Run(own | some(0.8, states) | some(0.8, inputs), seed(), [step() for _ in range(STEPS)])
 
 
 class Flight:
@@ -110,35 +43,70 @@ class Flight:
     def __init__(self, folder: Path, description: Any) -> None:
         unknowns = [unknown.variable.name for unknown in (*description.outputs, *description.derivatives)]
         self.slave = Slave(folder)
-        self.names = [v.name for v in description.modelVariables]
-        self.columns = [*self.names, *(f"change of {name}" for name in unknowns)]
-        inputs = [v.name for v in description.modelVariables if v.causality == "input"]
-        self._unknowns, self._knowns = ([self.slave.reference[name] for name in group] for group in (unknowns, inputs))
+        self.variables = {v.name: v for v in description.modelVariables}
+        self.columns = [*self.variables, *(f"change of {name}" for name in unknowns)]
+        self._parameters, self._inputs = (
+            [name for name, v in self.variables.items() if v.causality == causality]
+            for causality in ("parameter", "input")
+        )
+        self._tunable = [name for name in self._parameters if self.variables[name].variability == "tunable"]
+        states = [unknown.variable.derivative.name for unknown in description.derivatives]
+        self._states = [name for name in states if self.variables[name].initial == "exact"]
+        self._unknowns, self._knowns = (
+            [self.slave.reference[name] for name in group] for group in (unknowns, self._inputs)
+        )
 
-    def fly(self, run: Run) -> Floats:
-        """Make a run. Return a row for its start and for the end of each step, until a call fails."""
-        rows: list[list[float]] = []
+    def fly(self, number: int) -> Floats:
+        """Make the random run of a number. Return a row for its start and for the end of each step, until a call fails.
+
+        What is drawn depends on the number and on the description alone, so two FMUs make the same run.
+        """
+        draw, rows = np.random.default_rng((40, number)), list[list[float]]()
         with suppress(FMICallException):
-            self.slave.initialize(run.start)
-            rows.append(self._row(run.seed))
+            own = self._some(draw, 0.2, self._parameters) if draw.random() < 0.5 else {}  # else those of the file
+            self.slave.initialize(own | self._some(draw, 0.8, self._states) | self._some(draw, 0.8, self._inputs))
+            rows.append(self._row(draw))
             now = 0.0
             saved: tuple[float, bytes] | None = None
-            for step in run.steps:
-                if step.action == _SAVE:
+            for _ in range(STEPS):
+                action = draw.random()
+                if action < _SAVE:
                     saved = now, self.slave.saved()
-                elif step.action == _RESTORE and saved:
+                elif action < _SAVE + _RESTORE and saved:
                     now = saved[0]
                     self.slave.restore(saved[1])
-                self.slave.put(step.values)
-                self.slave.step(now, step.length)
-                now += step.length
-                rows.append(self._row(step.seed))
+                tuned = self._some(draw, 0.3, self._tunable) if draw.random() < 0.1 else {}
+                self.slave.put(tuned | self._some(draw, 0.7, self._inputs))
+                length = 10.0 ** draw.uniform(_SHORTEST, _LONGEST)
+                self.slave.step(now, length)
+                now += length
+                rows.append(self._row(draw))
         self.slave.fmu.reset()
         return np.array(rows).reshape(-1, len(self.columns))
 
-    def _row(self, seed: Sequence[float]) -> list[float]:
+    def _some(self, draw: np.random.Generator, share: float, names: Sequence[str]) -> dict[str, float]:
+        """Draw values of a share of the variables. A third of those of inputs are zero."""
+        chosen = [name for name in names if draw.random() < share]
+        return {name: 0.0 if name in self._inputs and draw.random() < 0.3 else self._one(draw, name) for name in chosen}
+
+    def _one(self, draw: np.random.Generator, name: str) -> float:
+        """Draw a value of a variable within its bounds."""
+        variable = self.variables[name]
+        stated = variable.declaredType or variable  # FMI 3.0 has the bounds in the type
+        low, high = float(stated.min or -np.inf), float(stated.max or np.inf)
+        start = float(variable.start or 0.0)
+        if np.isfinite(high - low) and name in self._inputs:  # commands, which saturate
+            return draw.uniform(1.1 * low, 1.1 * high)
+        if name not in self._parameters:
+            return start + 2.0 * float(stated.nominal or 1.0) * draw.normal()
+        value = start * np.exp(0.3 * draw.normal()) if start else draw.normal()
+        return float(np.clip(value, low, high))
+
+    def _row(self, draw: np.random.Generator) -> list[float]:
+        """Return all variables, and their change in a direction that is drawn in the space of the inputs."""
+        seed = draw.normal(size=len(self._knowns)).tolist()
         change = self.slave.fmu.getDirectionalDerivative(self._unknowns, self._knowns, seed)
-        return [*self.slave.get(*self.names), *change]
+        return [*self.slave.get(*self.variables), *change]
 
 
 def differences(columns: Sequence[str], flights: Sequence[tuple[Floats, Floats]]) -> list[str]:
@@ -174,7 +142,7 @@ def compare(trees: Sequence[Path], scratch: Path, vehicle: str, fmi: str, count:
     description = fmpy.read_model_description(str(folders[0]), validate=False)
     old, new = (Flight(folder, description) for folder in folders)
     with redirect_stdout(None):  # the warnings of the FMUs
-        flights = [(old.fly(run), new.fly(run)) for run in random_runs(description, count)]
+        flights = [(old.fly(n), new.fly(n)) for n in range(count)]
     lines = differences(old.columns, flights)
     equal = sum(not differences(old.columns, [flight]) for flight in flights)
     failed = sum(len(rows) <= STEPS for rows, _ in flights)
