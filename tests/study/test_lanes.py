@@ -135,7 +135,7 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     plan, parted = _plan(tmp_path, f'sampler = "{sampler}"\n{PLAN}'), tmp_path / "parted"
     whole = run_study(plan, tmp_path / "whole", workers=1)
     given = ["study", str(plan), "-o", str(parted)]
-    monkeypatch.setattr("rov_fmu.study.run.work._MOST", 5)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 5)
     for part in ("1/3", "3/3"):
         assert main([*given, "--part", part]) == 0
     assert not [*parted.glob("*.html")]
@@ -173,7 +173,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
 ) -> None:
     plan, progress = _plan(tmp_path), list[StudyProgress]()
     whole = run_study(plan, tmp_path / "whole")
-    monkeypatch.setattr("rov_fmu.study.run.work._MOST", 7)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 7)
 
     def interrupt(now: StudyProgress) -> None:
         progress.append(now)
@@ -184,7 +184,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
         run_study(plan, tmp_path / "results", on_progress=interrupt)
     interrupted = progress[-1].done
     assert 21 <= interrupted == len(Results(tmp_path / "results").runs) < 40
-    monkeypatch.setattr("rov_fmu.study.run.work._MOST", 4)
+    monkeypatch.setattr("rov_fmu.study.run.local._MOST", 4)
     same(run_study(plan, tmp_path / "results", on_progress=progress.append), whole)
     done = [now.done for now in progress]
     assert (done[0], done.count(interrupted), done[-1]) == (0, 2, 40), "it goes on where it was"

@@ -22,7 +22,9 @@ from rov_fmu.study.run.work import Work
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _AT_ONCE = 4_000_000
-"""The number of recorded values of a task that are in memory at a time."""
+"""The most recorded values of a task of a vehicle, which are in memory."""
+_MOST = 10_000
+"""The most runs of such a task, so that no more than a second of work is lost when the process is killed."""
 
 
 def do_here(work: Work, workers: int | None) -> None:
@@ -37,7 +39,7 @@ def do_here(work: Work, workers: int | None) -> None:
         ThreadPoolExecutor(threads) as pool,  # it ends after what its threads wait for
         closing(Lanes(study, vehicle, folder, workers) if vehicle else Children(study, folder)) as runner,
     ):
-        most = max(1, _AT_ONCE // (len(study.recorded) * len(study.plan.times)))
+        most = max(1, min(_MOST, _AT_ONCE // (len(study.recorded) * len(study.plan.times)))) if vehicle else None
         work.do_tasks(lambda *task: pool.submit(rows_of, study, runner.runs, *task), lambda: threads, most)
 
 

@@ -20,8 +20,6 @@ _TASK = 1.0
 """The seconds that a task should take."""
 _LEAST = 0.2
 """The least seconds of a task, also when few runs remain."""
-_MOST = 10_000
-"""The most runs of a task, so that no more than a second of work is lost when the process is killed."""
 _AHEAD = 3
 """The number of tasks submitted for each thread, so that no thread waits for the next one."""
 
@@ -58,15 +56,15 @@ class Work:
         return sum(end - first for first, end in self._missing)
 
     def do_tasks(
-        self, submit: Callable[[int, Array], "Future[Rows]"], threads: Callable[[], int], most: int = _MOST
+        self, submit: Callable[[int, Array], "Future[Rows]"], threads: Callable[[], int], most: int | None = None
     ) -> None:
         """Do the missing runs in tasks of about a second, and write the rows of each task as it ends.
 
-        `submit` gives the runs from a first one on to one of the threads, whose present number `threads` returns. A
-        task has at most so many runs.
+        `submit` gives the runs from a first one on to one of the threads, whose present number `threads` returns. The
+        first tasks have `most` runs, and no other one has more; without it, they have one run each.
         Raises LoadError, StudyError, WriteError, and what a connection to threads elsewhere raises.
         """
-        seconds = _TASK  # of a run, by the last task; the first tasks have one run each
+        seconds = _TASK / (most or 1)  # of a run, by the last task
         spans = dict["Future[Rows]", Span]()
         self.started = perf_counter() - self._made
         self._report()
@@ -75,7 +73,7 @@ class Work:
                 count = threads()
                 while self._missing and len(spans) < _AHEAD * (count or 1):
                     size = max(min(ceil(_TASK / seconds), ceil(self._left / (count or 1))), ceil(_LEAST / seconds))
-                    first, end = self._take(min(size, most, _MOST))
+                    first, end = self._take(min(size, most or size))
                     spans[submit(first, self._design.rows(first, end))] = first, end
                 done, _ = wait(spans, _WATCH, FIRST_COMPLETED)
                 for future in done:
