@@ -198,7 +198,7 @@ class FigureExpression:
         self._depth -= 1
         return found
 
-    def _computed(self, node: ast.expr | None) -> tuple[_Compute, _Unit]:  # noqa: C901, PLR0911, PLR0912 (each kind)
+    def _computed(self, node: ast.expr | None) -> tuple[_Compute, _Unit]:  # noqa: PLR0911, PLR0912 (each kind)
         match node:
             case None:
                 return lambda _: None, None
@@ -217,10 +217,9 @@ class FigureExpression:
                 return self._of(_slice, unit_of_first, array, lower, upper, step)
             case ast.Subscript(array, index):
                 return self._of(_index, unit_of_first, array, index)
-            case ast.UnaryOp(op, operand):
-                return self._of(*_OPERATORS[type(op)], operand)
-            case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
-                return self._of(*_OPERATORS[type(op)], left, right)
+            case ast.UnaryOp(op=op) | ast.BinOp(op=op) if type(op) in _OPERATORS:
+                operands = (part for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr))
+                return self._of(*_OPERATORS[type(op)], *operands)
             case ast.Compare(left, ops, others) if {*map(type, ops)} <= _OPERATORS.keys():
                 return self._of(partial(_compare, [_OPERATORS[type(op)][0] for op in ops]), "1", left, *others)
             case ast.BoolOp(op, operands):
@@ -253,14 +252,16 @@ class FigureExpression:
             near = did_you_mean(name, self._functions)
             raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{near}")
         compute, unit = function
-        named, count = [k.arg or "**" for k in keywords], len(given)
-        form = signature(compute)
+        form, named, count = signature(compute), {k.arg or "**": k.value for k in keywords}, len(given)
         try:
-            form.bind(*given, **dict.fromkeys(named))
+            form.bind(*given, **named)
         except TypeError as error:
             raise ExpressionError(f"{name}({', '.join(form.parameters)}): {error}") from error
-        values = [*given, *(k.value for k in keywords)]
-        return self._of(lambda *of: compute(*of[:count], **dict(zip(named, of[count:], strict=True))), unit, *values)
+
+        def called(*of: _Value) -> _Value:
+            return compute(*of[:count], **dict(zip(named, of[count:], strict=True)))
+
+        return self._of(called, unit, *given, *named.values())
 
 
 # ---- Computing -------------------------------------------------------------------------------------------------------

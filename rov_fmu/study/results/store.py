@@ -52,10 +52,8 @@ def old_rows(folder: Path, outputs: Sequence[str]) -> pa.Table:
     table = pq.read_table(folder / RUNS).sort_by(RUN)
     if not outputs:
         return table
-    long = pq.read_table(folder / "trajectories").sort_by([(RUN, "ascending"), (TIME, "ascending")])
-    names = (TIME, *outputs)
-    lists = long.group_by(RUN, use_threads=False).aggregate([(name, "list") for name in names])
-    by_run = {row[RUN]: {name: row[f"{name}_list"] for name in names} for row in lists.to_pylist()}
+    long = pq.read_table(folder / "trajectories").to_pandas().sort_values([RUN, TIME])
+    by_run = {run: own[[TIME, *outputs]].to_dict("list") for run, own in long.groupby(RUN)}
     return table.append_column(TRAJECTORY, pa.array([by_run.get(run) for run in table[RUN].to_pylist()]))
 
 
