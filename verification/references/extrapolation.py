@@ -6,7 +6,6 @@ velocity reverses, and Newton's method finds that time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,15 +25,9 @@ _TOLERANCE = 1e-33  # of a step
 _SETTLED = 1e-42
 
 
-@dataclass
-class Ended:
-    """The end of a motion: the states, with the pose relative to the start, and what scales their errors."""
-
-    state: dict[str, Number]
-    fastest: dict[str, Number]
-    """The largest velocity of each axis."""
-    paths: dict[str, Number]
-    """The length of the path of each coordinate, back and forth."""
+Ended = tuple[dict[str, Number], dict[str, Number], dict[str, Number]]
+"""The end of a motion: the states, with the pose relative to the start, the largest velocity of each axis, and the
+length of the path of each coordinate, back and forth."""
 
 
 class _System:
@@ -206,7 +199,7 @@ def integrate(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, flo
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
         names = [*system.names, "x", "y", "z", "psi", *system.lagging]
         planar, depth, turn = map(plain, paths)
-        return Ended(
+        return (
             {name: plain(x) for name, x in zip(names, y, strict=True)},
             {name: plain(x) for name, x in zip(system.names, fastest, strict=True)},
             {"x": planar, "y": planar, "z": depth, "psi": turn},

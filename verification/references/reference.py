@@ -18,7 +18,7 @@ from mpmath.calculus.quadrature import GaussLegendre
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .equations import Axis, Equations, equations
-from .extrapolation import integrate
+from .extrapolation import Ended, integrate
 
 DIGITS = 50
 Number = Any  # a number of mpmath, real or complex
@@ -244,8 +244,7 @@ def step(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], 
     with mp.workdps(4 * DIGITS):
         equation = equations(rov, inputs, mp)
         if equation.lags or equation.coupled:
-            ended = integrate(rov, inputs, state, h)
-            found, fastest, paths = ended.state, ended.fastest, ended.paths
+            found, fastest, paths = integrate(rov, inputs, state, h)
         else:
             found, fastest, paths = _uncoupled(equation, state, h)
         scale = fastest | {name: paths[name] for name in ("x", "y", "z", "psi")}
@@ -259,11 +258,8 @@ def step(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], 
         return Step({name: found[name] for name in state}, {name: scale[name] for name in state})
 
 
-_Numbers = dict[str, Number]
-
-
-def _uncoupled(equation: Equations, state: Mapping[str, float], h: float) -> tuple[_Numbers, _Numbers, _Numbers]:
-    """Return the state of a vehicle without coupling and lag, its largest velocities and the lengths of its paths."""
+def _uncoupled(equation: Equations, state: Mapping[str, float], h: float) -> Ended:
+    """Return the end of the motion of a vehicle without coupling and lag."""
     still = Axis((0, 0), (0, 0), mp.zero, mp.zero, (), mp.inf)
     axes = {name: equation.axes.get(name, still) for name in ("u", "v", "w", "r")}
     forms = {name: (*form.ahead, form.constant, state.get(name, 0.0), h, form.astern) for name, form in axes.items()}
