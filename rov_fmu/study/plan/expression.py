@@ -18,7 +18,6 @@ from functools import partial, reduce
 from inspect import signature
 from itertools import pairwise
 from math import e, inf, nan, pi
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +28,7 @@ TIME = "t"
 """The times of the communication points, in an expression."""
 BY_NAME = "out"
 """The name by which an expression gets variables whose name is not a valid Python identifier: out["der(u)"]."""
-CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": pi, "e": e, "nan": nan, "inf": inf})
+CONSTANTS: Mapping[str, float] = {"pi": pi, "e": e, "nan": nan, "inf": inf}
 """Numbers by their names in an expression."""
 _DEEPEST = 100
 """The deepest nesting of an expression. Reading and evaluating it use Python's stack."""
@@ -119,24 +118,19 @@ _TAKING: Mapping[int, Callable[[Callable[..., _Value]], Callable[..., _Value]]] 
 }
 """By the number of values, what keeps a function of NumPy from its other parameters: `out`, for example, writes into an
 array."""
-FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
-    {
-        name: FigureFunction(_TAKING[count](getattr(np, name)), unit)
-        for (count, unit), names in _OF_NUMPY.items()
-        for name in names
-    }
-    | {
-        "gradient": FigureFunction(lambda y, t=1.0, /: np.gradient(elements(y), t)),
-        "len": FigureFunction(lambda y, /: float(len(y)), "1"),
-        "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
-        "min": _of_all(np.min, np.minimum),
-        "round": FigureFunction(_round, unit_of_first),
-        "sorted": FigureFunction(lambda y, /: np.sort(y), unit_of_first),
-        "where": FigureFunction(
-            lambda x, y, z, /: np.asarray(np.where(x, y, z))[()], lambda _, *either: _common(*either)
-        ),
-    }
-)
+FUNCTIONS: Mapping[str, FigureFunction] = {
+    name: FigureFunction(_TAKING[count](getattr(np, name)), unit)
+    for (count, unit), names in _OF_NUMPY.items()
+    for name in names
+} | {
+    "gradient": FigureFunction(lambda y, t=1.0, /: np.gradient(elements(y), t)),
+    "len": FigureFunction(lambda y, /: float(len(y)), "1"),
+    "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
+    "min": _of_all(np.min, np.minimum),
+    "round": FigureFunction(_round, unit_of_first),
+    "sorted": FigureFunction(lambda y, /: np.sort(y), unit_of_first),
+    "where": FigureFunction(lambda x, y, z, /: np.asarray(np.where(x, y, z))[()], lambda _, *either: _common(*either)),
+}
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
 
 _OF_OPERATORS: Mapping[_UnitRule, Mapping[type[ast.AST], Callable[..., _Value]]] = {
@@ -145,14 +139,22 @@ _OF_OPERATORS: Mapping[_UnitRule, Mapping[type[ast.AST], Callable[..., _Value]]]
     _quotient: {ast.Div: operator.truediv},
     unit_of_first: {ast.UAdd: operator.pos, ast.USub: operator.neg},
     "1": {
-        **{ast.Not: lambda value: np.bool_(not _truth(value)), ast.Invert: np.logical_not},
-        **{ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal},
-        **{ast.Eq: np.equal, ast.NotEq: np.not_equal},
+        ast.Not: lambda value: np.bool_(not _truth(value)),
+        ast.Invert: np.logical_not,
+        ast.Lt: np.less,
+        ast.LtE: np.less_equal,
+        ast.Gt: np.greater,
+        ast.GtE: np.greater_equal,
+        ast.Eq: np.equal,
+        ast.NotEq: np.not_equal,
     },
     None: {
-        **{ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod},
+        ast.FloorDiv: operator.floordiv,
+        ast.Mod: operator.mod,
         ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
-        **{ast.BitAnd: np.logical_and, ast.BitOr: np.logical_or, ast.BitXor: np.logical_xor},
+        ast.BitAnd: np.logical_and,
+        ast.BitOr: np.logical_or,
+        ast.BitXor: np.logical_xor,
     },
 }
 """What operators compute, by the unit of their results. Comparisons are NumPy's, because Python's True + True is an

@@ -80,11 +80,8 @@ class Design:
     def _grid(self, first: int, end: int) -> Array:
         """Go through all combinations; the last variable changes fastest."""
         counts = [len(varied.choices or ()) for varied in self._plan.vary.values()]
-        drawn = np.empty((end - first, len(counts)))
-        _, *indices = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
-        for column, index in enumerate(indices):
-            drawn[:, column] = (index + 0.5) / counts[column]
-        return drawn
+        places = np.array(np.unravel_index(np.arange(first, end), (1, *counts))).T  # one point without variables
+        return np.asarray((places[:, 1:] + 0.5) / counts)
 
     @cached_property
     def _sequence(self) -> qmc.Sobol:
