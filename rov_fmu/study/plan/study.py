@@ -59,11 +59,10 @@ def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
     has = model.variables
     vehicle = load_vehicle(named_in(path, "vary_from", plan.vary_from, PlanError)) if plan.vary_from else None
     design = Design(plan, has, vehicle)
-    from_file, lines = _read_inputs(plan, path, has)
+    from_file, wrong_rows = _read_inputs(plan, path, has)
     wrong = lines_on(path, [*design.check(plan.inputs | from_file), *_check(plan, has, design.names)])
-    wrong += _check_rows(plan, path, has, from_file, lines)
-    if wrong:
-        raise PlanError(*wrong)
+    if wrong or wrong_rows:
+        raise PlanError(*wrong, *wrong_rows)
     whole = plan.model_copy(update={"inputs": plan.inputs | from_file})
     middles = plan.times[:-1] + 0.5 * plan.step
     inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in whole.inputs.items()}
@@ -97,18 +96,27 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
         yield f"the plan gives no input of the FMU ({some_of(names)}): all keep their start values"
 
 
-def _read_inputs(plan: Plan, path: Path, has: Mapping[str, Variable]) -> tuple[dict[str, InputSignal], Sequence[int]]:
-    """Return the inputs in the CSV file of the plan, and the line of each row. Raises FileError."""
+def _read_inputs(plan: Plan, path: Path, has: Mapping[str, Variable]) -> tuple[dict[str, InputSignal], list[str]]:
+    """Return the inputs in the CSV file of the plan, and a line for each that does not fit, with its column and row.
+
+    Raises FileError about the file itself.
+    """
     if not plan.input_file:
-        return {}, ()
+        return {}, []
     file, between = path.parent / plan.input_file.path, plan.input_file.between
     table = read_series(file, lambda name: None if name in has else unknown(name, has))
     (_, times), *columns = table.items()
-    found = {}
+    found, wrong = dict[str, InputSignal](), []
     for name, values in columns:
         kind = between if has[name].is_continuous else "steps"
-        found[name] = InputSignal.model_validate({kind: tuple(zip(times, values, strict=True))})
-    return found, table.lines
+        signal = found[name] = InputSignal.model_validate({kind: tuple(zip(times, values, strict=True))})
+        taken = [(None, "is given in [inputs] too")] if name in plan.inputs else []
+        for n, reason in taken or _misfits(name, signal, plan, has):
+            where = f"column {shown(name)}"
+            if n is not None:
+                where = f"line {table.lines[n]}, {where} = {values[n]:g} at {times[n]:g} s"
+            wrong.append(f"{file}: {where}: {reason}")
+    return found, wrong
 
 
 # ---- Checks ----------------------------------------------------------------------------------------------------------
@@ -137,20 +145,6 @@ def _check(plan: Plan, has: Mapping[str, Variable], varied: Collection[str]) -> 
             yield key_line(key, reason, text)
     if taken := {RUN, TIME} & {*plan.kept}:
         yield key_line("keep.outputs", f"the results have another column {taken.pop()}")
-
-
-def _check_rows(
-    plan: Plan, path: Path, has: Mapping[str, Variable], from_file: Mapping[str, InputSignal], lines: Sequence[int]
-) -> Iterator[str]:
-    """Yield a line for each input in a file that does not fit, with its column and the line of its row."""
-    for name, signal in from_file.items():
-        taken = [(None, "is given in [inputs] too")] if name in plan.inputs else []
-        for n, reason in taken or _misfits(name, signal, plan, has):
-            where = f"column {shown(name)}"
-            if n is not None:
-                time, value = signal.points[n]
-                where = f"line {lines[n]}, {where} = {value:g} at {time:g} s"
-            yield f"{path.parent / str(plan.input_file and plan.input_file.path)}: {where}: {reason}"
 
 
 def _misfits(
