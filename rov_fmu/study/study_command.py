@@ -1,6 +1,7 @@
 """The command `rov-fmu study`: the study with its progress, the page, and a run for Foxglove."""
 
 import logging
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +39,10 @@ def study_plan(
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
     motion = output / f"run-{run}.mcap"
     targets = [(path, "") for path in (output / PAGE, output / STUDY, motion if run is not None else None)]
+    check = partial(check_targets, targets if output.is_dir() else (), force=force, is_ours=is_description)
+    check([plan])
     read = load_plan(plan)
-    inputs = [plan, *(plan.parent / name for name in read.files)]
-    check_targets(targets if output.is_dir() else (), inputs, force=force, is_ours=is_description)
+    check([plan, *(plan.parent / name for name in read.files)])
     vehicle = read.vehicle
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
