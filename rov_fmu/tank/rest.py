@@ -54,7 +54,7 @@ _STANDS = 0.1
 """A vehicle stands still along surge or sway where drag takes less than this share of the push."""
 _LEAST, _LEAST_HORIZONTAL = 1.2, 3.0
 """The least time of contradiction in a rest in heave, and in surge or sway, s. Of the right dives, none has 1.2 s in
-heave. A DVL without lock shows 0 for about 3 s. Shorter contacts hardly count."""
+heave. A DVL without lock shows 0 for about 3 s, and 2 s along surge would cost a right dive with a stale one 23 s."""
 _FEW = 6
 """So many steps in which motion and push agree may do so by chance."""
 _ROUNDS = 30
