@@ -83,12 +83,13 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     show = work.steps("predicting what was left out")
     show(0)
     predicted = []
-    out = held_out(fit.objective, fit.best)
+    out = [] if fit.has_ended else held_out(fit.objective, fit.best)  # nobody should use what it predicts
     for prediction in predictions(fit.objective, fit.best, out, against):
         predicted.append(prediction)
         show(len(predicted))
     runs = followed(fit.objective, fit.best.z)
-    slow = tuple(disturbances(fit.objective, fit.best, fit.posterior, runs, known.fitted))
+    refines = not fit.has_ended
+    slow = tuple(disturbances(fit.objective, fit.best, fit.posterior, runs, known.fitted, refines=refines))
     vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
@@ -173,7 +174,9 @@ def _axis(
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
         points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
-        next_test=next_test(fit.objective, shown, axis, limits, answers, tested) if answers else None,
+        next_test=next_test(fit.objective, shown, axis, limits, answers, tested)
+        if answers and not fit.has_ended
+        else None,
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio,
         soon=fit.structure[axis].soon,

@@ -10,7 +10,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
-from rov_fmu.identify.likelihood.hypotheses import Starts, Suspect
+from rov_fmu.identify.likelihood.hypotheses import Starts, Suspect, applied
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -47,11 +47,11 @@ _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
 _STARTS = ("start 1", "start 2")
 """The kinds of the parameters say where they begin: with much noise, J has few minima far from the data."""
-_UNREFINED = 4
+_UNREFINED = 2
 """The most steps on all samples of a fit that nobody should use."""
-_PATIENCE, _BEFORE = 5e6, 4
-"""After so many fits times samples, also those of tables, and parameters, no more causes are tried for a model that is
-wrong along all axes: a minute on a usual machine. The fits before the search are about as long as four of its own."""
+_PATIENCE = 2e6
+"""After so many fits times samples and parameters, no more causes are tried for a model that is wrong along all axes:
+half a minute on a usual machine."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -138,24 +138,13 @@ def fit_all(
     work = work or ProgressReport()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends = _from_starts(quick, work)
-    start = StructureFit({}, quick, ends[0], 0.0, 0.0)
+    score = evidence(quick, ends[0])
+    start = StructureFit({}, quick, ends[0], score, score)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
-    most = _UNREFINED if is_mistake else MOST_STEPS
     work.leave_out(*((HYPOTHESES, REFINED, *SPLINE) if is_mistake else ()))
-    near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
-    work.fits(full, near)
-    plain = StructureFit({}, full, near, evidence(full, near), evidence(quick, ends[0]))
-    plain, first = (plain, dict[Suspect, float]()) if is_mistake else settled(plain)
-    before = windows(plain.objective, plain.minimum.z)
-    tried, show_tried = count(), work.steps("hypotheses")
-    size = len(near.z) * sum(len(one.innovations) for one in near.data)
-    search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size - _BEFORE)
-    if not is_mistake:
-        search.run()
-    full, near = search.now.objective, search.now.minimum
-    is_wrong = is_mistake or search.now.is_hopeless
-    if first or search.odds:
-        work.fits(full, near)
+    search, first, now = _searched_for_structure(start, full, work, is_mistake=is_mistake)
+    full, near, is_wrong = now.objective, now.minimum, is_mistake or search.now.is_hopeless
+    before = windows(search.plain.objective, search.plain.minimum.z)
     measured = full.table.known.measured_curves
     for curve in () if is_wrong else measured:
         other, needed = _bending(full, full.table.known.bent | {curve}), evidence(full, near) + KEPT
@@ -206,19 +195,63 @@ def fit_all(
     )
 
 
+def _searched_for_structure(
+    start: StructureFit, full: Objective, work: ProgressReport, *, is_mistake: bool
+) -> tuple[StructureSearch, dict[Suspect, float], StructureFit]:
+    """Search for the structure from a fit to thinned logs, and return the search, the odds of what left samples out,
+    and the fit to all samples at its end.
+
+    Where the model is wrong along all axes, thinned logs tell as well what explains it. All samples are fitted to the
+    end only when something does.
+    """
+    tried, show_tried = count(), work.steps("hypotheses")
+
+    def searched(plain: StructureFit, before: StructureSearch | None = None) -> StructureSearch:
+        size = len(plain.minimum.z) * sum(len(one.innovations) for one in plain.minimum.data)
+        search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size)
+        if before:
+            search.begin_with(before)
+        search.run()
+        return search
+
+    search, first = StructureSearch(start), dict[Suspect, float]()
+    if start.is_hopeless and not is_mistake:
+        settled_start, first = settled(start)
+        search = searched(settled_start)
+    now, is_wrong = search.now, is_mistake or search.now.is_hopeless
+    if is_wrong:
+        full = applied(search.plain.objective, now.starts)
+    most = _UNREFINED if is_mistake or start.is_hopeless else MOST_STEPS
+    begin = scaled(full, now.minimum.z if is_wrong else start.minimum.z)
+    near = minimise(full, begin, work.steps("all samples"), most=most, last=False)
+    work.fits(full, near)
+    if is_wrong:
+        return search, first, replace(now, objective=full, minimum=near)
+    plain, first = settled(StructureFit({}, full, near, evidence(full, near), start.quick))
+    search = searched(plain, search)
+    if first or search.odds:
+        work.fits(search.now.objective, search.now.minimum)
+    return search, first, search.now
+
+
 def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
     """Return J where only some curves bend."""
     return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
 
 
 def _from_starts(quick: Objective, work: ProgressReport) -> list[Minimum]:
-    """Return the minima of J of thinned logs from two starts, the least first, or from one if that is enough."""
+    """Return the minima of J of thinned logs from two starts, the least first, or from one if that is enough.
+
+    Where the first one leaves the model wrong along all axes, the second one counts only if it becomes lower.
+    """
     work.leave_out(*(() if quick.table.known.measured_curves else SPLINE))
     ends: list[Minimum] = []
+    than = np.inf
     for n, words in enumerate(_STARTS):
         if ends and not _is_loud(quick.table, ends[0].z):
             break
-        ends.append(least_from(quick, start_of(quick, n), work.steps(words)))
+        ends.append(least_from(quick, start_of(quick, n), work.steps(words), than))
+        than = ends[0].value if StructureFit({}, quick, ends[0], 0.0, 0.0).is_hopeless else np.inf
         work.fits(quick, min(ends, key=lambda end: end.value))
     return sorted(ends, key=lambda end: end.value)
 

@@ -227,7 +227,7 @@ class Objective:
         self, table: Table, logs: Sequence[SampledLog], rows: Sequence[TableRow], *, thinned: bool = False
     ) -> None:
         """Make the filters. Raises BuildError."""
-        self.table, self.logs, self.rows = table, logs, rows
+        self.table, self.logs, self.rows, self.is_thinned = table, logs, rows, thinned
         self.records = [one.thinned if thinned else one.record for one in logs]
         steps = _QUICK_STEPS if thinned else {}
         filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}

@@ -490,11 +490,11 @@ def fitted(
 ) -> StructureFit | None:
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
-    `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise begins
-    as in a first fit: that of a wrong model explains what the right one would. If a motion diverges from there, all
-    begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below
-    `enough`: a fit that will not come there is given up.
+    `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. If its logs are thinned, so are
+    those of the result. Each parameter begins where the fit `near` ended, or at its prior mean if the hypotheses change
+    that. Where they change the thrust, the noise begins as in a first fit: that of a wrong model explains what the
+    right one would. If a motion diverges from there, all begin as in a first fit. The result is None if a motion
+    diverges, or if the evidence of thinned logs is below `enough`: a fit that will not come there is given up.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
@@ -510,8 +510,8 @@ def fitted(
         end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False, promises=promises)
         quick = evidence(thinned, end)
         if quick > enough:
-            objective = applied(plain, starts)
-            end = minimise(objective, scaled(objective, end.z), last=False)
+            objective = thinned if plain.is_thinned else applied(plain, starts)
+            end = end if plain.is_thinned else minimise(objective, scaled(objective, end.z), last=False)
             rows = {suspect: row_of(objective, suspect) for suspect in starts}
             ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
             return StructureFit(ends, objective, end, evidence(objective, end) + prior, quick)
@@ -584,6 +584,13 @@ class StructureSearch:
         """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
         self.refuted = dict[Suspect, Start]()
         """The hypotheses that were more probable than others, but do not explain the errors over 10 s."""
+
+    def begin_with(self, other: "StructureSearch") -> None:
+        """Begin with what a search on thinned logs found. What they exclude is not fitted again."""
+        starts = other.now.starts
+        self.tried |= {key: None for key, fit in other.tried.items() if not fit}
+        if starts and (fit := fitted(other.now, self.plain.objective, starts, self._prior(starts))):
+            self.tried[frozenset(starts)] = self.now = fit
 
     def run(self) -> None:
         """Try the hypotheses where the alarm asks for it.

@@ -155,14 +155,19 @@ def louder(objective: Objective, z: Array) -> Array:
     return np.where(objective.table.each("of_motion"), z, np.maximum(z, start_of(objective)))
 
 
-def least_from(objective: Objective, start: Array, on_step: OnStep = lambda _: None) -> Minimum:
+def least_from(objective: Objective, start: Array, on_step: OnStep = lambda _: None, than: float = np.inf) -> Minimum:
     """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
-    In the valley between both, J has a kink wherever the dead band passes a command of the tests.
+    In the valley between both, J has a kink wherever the dead band passes a command of the tests. A fit that will not
+    come below `than` is given up.
     """
-    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False)
+
+    def promises(end: Minimum, gain: float) -> bool:
+        return end.value - REST * gain < than
+
+    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False, promises=promises)
     larger = objective.table.with_larger_dead_bands(end.z)
-    if np.array_equal(larger, end.z):
+    if end.value > than or np.array_equal(larger, end.z):
         return end
     other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=QUICK, last=False)
     return min(end, other, key=lambda found: found.value)

@@ -34,13 +34,19 @@ def followed(objective: Objective, z: Array) -> list[FilterRun]:
 
 
 def disturbances(
-    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[FilterRun], fitted: Sequence[Axis]
+    objective: Objective,
+    best: Minimum,
+    posterior: Posterior,
+    runs: Sequence[FilterRun],
+    fitted: Sequence[Axis],
+    *,
+    refines: bool = True,
 ) -> Iterator[Disturbance]:
     """Yield each slow process of the model in each log that has it, with the evidence for it: those along the axes that
-    are fitted, and along no axis."""
+    are fitted, and along no axis. The evidence is rough unless it `refines` the fits without them."""
     for index, p in enumerate(objective.table.parameters):
         if p.kind in SLOW:
-            gain, error = _evidence(objective, best, index), float(posterior.errors[index])
+            gain, error = _evidence(objective, best, index, _STEPS if refines else 1), float(posterior.errors[index])
             in_logs = [_disturbance(objective, n, best.z, p, runs, gain, error) for n in range(len(runs))]
             present = [one for one in in_logs if one and (one.axis is None or one.axis in fitted)]
             if present:
@@ -64,8 +70,8 @@ def unknown_forces(objective: Objective, runs: Sequence[FilterRun]) -> Iterator[
             yield UnknownForce(form.axis, sampled.file, time, run.states[:, index], run.deviations[:, index])
 
 
-def _evidence(objective: Objective, best: Minimum, index: int) -> float:
-    """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it.
+def _evidence(objective: Objective, best: Minimum, index: int, steps: int) -> float:
+    """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it, in some steps.
 
     The fit ends early where strong evidence is certain: the minimum within reach is not low enough. The information
     about the other parameters is taken to be the same without it, because that about small sizes is rough.
@@ -80,7 +86,7 @@ def _evidence(objective: Objective, best: Minimum, index: int) -> float:
         end = replace(best, z=z, value=without.value(z, objective.runs(z, best.runs)))
         if gain(end) > KEPT:
             end = minimise(
-                without, z, near=best.data, most=_STEPS, last=False, promises=lambda one, _: gain(one) <= KEPT
+                without, z, near=best.data, most=steps, last=False, promises=lambda one, _: gain(one) <= KEPT
             )
         return gain(end)
     except DivergedError:
