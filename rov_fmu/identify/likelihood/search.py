@@ -571,10 +571,13 @@ class StructureSearch:
         plain: StructureFit,
         on_fit: Callable[[], None] = lambda: None,
         most: float = inf,
+        *,
+        is_first: bool = False,
     ) -> None:
         """`plain` is the fit without hypotheses; `on_fit` is called before each other fit. A search for what is wrong
-        with a model along all axes ends after `most` fits."""
-        self.plain, self.on_fit, self.most = plain, on_fit, most
+        with a model along all axes ends after `most` fits. A first search on thinned logs ends as soon as something
+        explains an axis: another one goes on from there with all samples."""
+        self.plain, self.on_fit, self.most, self.is_first = plain, on_fit, most, is_first
         self.has_ended = False
         """True if it was late, and nothing had explained the errors along any axis in a round."""
         self.now = plain
@@ -611,7 +614,7 @@ class StructureSearch:
         """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
         for number in rounds:
             self.has_ended = number > 0 and self._is_over
-            if self.has_ended:
+            if self.has_ended or (self.is_first and not self.now.is_hopeless):
                 break
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
