@@ -9,9 +9,6 @@ it is what a current does by the heading, and the coupling with the turn.
 Horizontally, a vehicle must stand still. Something that slides along an oblique wall is not told, and no wall is where
 nothing measures a velocity.
 
-On deck, a vehicle needs no command to be told: it stands in air, higher than anywhere where a push moves it. Else, what
-lies without a command that contradicts it is told only at a depth where a push has done so, too.
-
 At the beginning or the end of a log, thrusters that are off contradict their commands, too. A surface stops only a push
 up, and a bottom only one down: other pushes without an answer count against a rest there, except in air. Where a push
 moves the vehicle, there is water. A sensor that takes all above it for the surface looks like a rest at the surface.
@@ -55,8 +52,6 @@ _STANDS = 0.1
 _LEAST, _LEAST_HORIZONTAL = 1.2, 3.0
 """The least time of contradiction in a rest in heave, and in surge or sway, s. Of the right dives, none has 1.2 s in
 heave. A DVL without lock shows 0 for about 3 s, and 2 s along surge would cost a right dive with a stale one 23 s."""
-_FEW = 6
-"""So many steps in which motion and push agree may do so by chance."""
 _ROUNDS = 30
 """How often the samples are weighed anew by their errors."""
 _LEAST_PIECE = 5.0
@@ -142,8 +137,7 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
     for start, end in true_runs(slow):  # shorter ones come from pushes that change within a window
         slow[start : end + 1] = end - start >= _HALF // 2
     least = _LEAST if is_depth else _LEAST_HORIZONTAL
-    moved = np.sort(place[agrees])
-    top = float(moved[_FEW]) if len(moved) > _FEW else np.inf  # above, no push moves it but by chance
+    top = float(place[agrees].min(initial=np.inf))  # above, no push moves it
 
     def side_of(at: float) -> int:
         """Return 1 at the surface, below which a vehicle is free, -1 at the bottom, and 0 between."""
@@ -175,9 +169,6 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
             touching = first + np.flatnonzero(side * (place[first : last + 1] - at) < still)
             if len(touching):
                 leave_out(first, last, touching)
-    above = place < min(-height, top - still)
-    for start, end in true_runs(above & is_depth & (len(moved) > _FEW)):  # on deck, also without a command
-        rests[start : end + 1] |= _stands(place[start : end + 1], still)
     for start, end in true_runs(rests):
         if in_air(float(np.median(place[start : end + 1]))):
             rests[_moved_by_hand(push, start, -1) : _moved_by_hand(push, end, 1) + 1] = True
@@ -242,12 +233,6 @@ def _shares(
     share[_HALF:-_HALF][is_told] = ((acceleration - slowed) / push)[is_told]
     drag[_HALF:-_HALF][is_told] = (slowed / push)[is_told]
     return given, share, drag
-
-
-def _stands(place: Array, still: float) -> bool:
-    """Return True if a vehicle stays within `still`, m, for as long as no moving one does."""
-    size = round(_LEAST_HORIZONTAL / _STEP)
-    return len(place) >= size and bool((np.ptp(sliding_window_view(place, size), axis=1) < still).any())
 
 
 def _moved_by_hand(told: Array, at: int, side: int) -> int:

@@ -68,7 +68,7 @@ def test_only_these_places_print() -> None:
         for path in sorted(root.rglob("*.py"))
         for _ in prints.findall(path.read_text(encoding="utf-8"))
     ]
-    assert found == ["__init__.py", "bridges/sitl.py", "bridges/sitl.py", "cli.py", "cli.py", "io/messages.py"]
+    assert found == ["__init__.py", "cli.py", "cli.py", "io/messages.py"]
 
 
 # ---- Numbers and words -----------------------------------------------------------------------------------------------

@@ -113,10 +113,6 @@ def waits(t: float, s: State) -> None:
     s.down = 0.3 * np.sign(np.sin(1.5 * t)) * (t < 8.0) if t < 24.0 else 0.4 if t < 28.0 else s.down
 
 
-def waits_silently(t: float, s: State) -> None:
-    s.down = 0.0 if t < 24.0 else 0.4 if t < 28.0 else s.down
-
-
 def on_deck(t: float, s: State) -> None:
     s.w = 0.0 if t < 14.0 else 0.5 if t < 22.0 else s.w
 
@@ -170,7 +166,6 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(4, ends_below, dives_to(7.0)), [(0.0, 110.0)], [(102.0, 109.0)]),
         (drawn(4, holds_depth, dives_to(6.5)), [(44.0, 78.0)], [(50.0, 74.0)]),
         (drawn(5, waits, on_deck, start=-1.2), [(0.0, 24.5)], [(0.0, 23.5)]),
-        (drawn(6, waits_silently, on_deck, start=-1.2, load=0.0), [(0.0, 24.5)], [(0.0, 23.5)]),
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
         (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
@@ -183,7 +178,6 @@ def pushes_on(t: float, s: State) -> None:
         "bottom at the end",
         "depth held on the bottom",
         "deck",
-        "deck without a command",
         "hand",
         "pulled up",
         "wall",
