@@ -127,6 +127,18 @@ def _plan(folder: Path, text: str = PLAN) -> Path:
     return path
 
 
+def test_a_figure_has_its_own_values_under_any_name(tmp_path: Path) -> None:
+    """Also under a name that a run has for something else."""
+    names = ("turned", "columns", "seconds", "time")
+    figures = "".join(f'{name} = "u[-1]"\n' for name in (*names, "V"))
+    found = run_study(
+        _plan(tmp_path, f"{PLAN.partition('[figures]')[0]}[figures]\n{figures}"), tmp_path / "results"
+    ).runs
+    assert found.V.abs().min() > 0.0
+    for name in names:
+        assert (found[name] == found.V).all()
+
+
 @pytest.mark.parametrize("sampler", spread(["sobol", "random", "latin-hypercube", "saltelli"], ["sobol"], ["saltelli"]))
 def test_parts_are_merged_to_the_bits_of_one_run(
     sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -205,8 +217,8 @@ def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(six
     with closing(Lanes(study, rov, "", None)) as lanes:
         lanes.fmu = Child(six_dir, study)  # type: ignore[assignment]
         found = lanes.runs(design.rows(0, 4))
-    assert [run["status"] for run in found] == ["done", "failed", "failed", "failed"]
-    reasons = [run["reason"] or "" for run in found]
+    assert [run.columns["status"] for run in found] == ["done", "failed", "failed", "failed"]
+    reasons = [run.columns["reason"] or "" for run in found]
     assert reasons[1].startswith("the step at 0 s: ")
     assert reasons[2] == reasons[3]
     assert "the mass matrix of these parameters is not positive definite" in reasons[2]

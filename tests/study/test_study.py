@@ -170,9 +170,9 @@ def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_t
     child = Child(folder, study.unpacked(folder))
     runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, mode], [1.0, 0.0, 0.0, 0.0]]))
     child.close()
-    assert [(run["status"], run["reason"], run.get("turned")) for run in runs] == [
+    assert [(run.columns["status"], run.columns["reason"], run.turned) for run in runs] == [
         ("done", None, True),
-        ("failed", f"the FMU {reason}", None),
+        ("failed", f"the FMU {reason}", False),
         ("done", None, False),
     ]
     with pytest.raises(LoadError, match="the study has ended"):
@@ -398,7 +398,7 @@ def test_a_scheduler_that_is_not_there_is_a_line(
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 1.0)
     scheduler: Any = cluster.scheduler
     (worker,) = scheduler.workers
-    for address in ("tcp://127.0.0.1:9", worker):
+    for address in ("tcp://127.0.0.1:9", worker, ""):
         with pytest.raises(FileError) as refused:
             run_study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
         assert str(refused.value) == f"--scheduler {address}: no scheduler of Dask answers there"

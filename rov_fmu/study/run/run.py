@@ -16,16 +16,20 @@ from rov_fmu.study.results.store import parquet
 
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
-TURNED = "turned"
-"""True of a run in which the vehicle turned over: it rolled or pitched by more than 90 degrees. It is no column."""
 
-Run = dict[str, Any]
-"""What a run gave, by column: status, reason, figures and trajectory. A run that failed has the first two."""
+
+class Run(NamedTuple):
+    """What a run gave."""
+
+    columns: Mapping[str, Any]
+    """The status, reason, figures and trajectory, by column. A run that failed has the first two."""
+    turned: bool = False
+    """True if the vehicle turned over: it rolled or pitched by more than 90 degrees."""
 
 
 def lost(reason: object) -> Run:
     """Return a run that did not end."""
-    return {STATUS: FAILED, REASON: str(reason)}
+    return Run({STATUS: FAILED, REASON: str(reason)})
 
 
 class Evaluation:
@@ -41,13 +45,13 @@ class Evaluation:
         study, plan = self._study, self._study.plan
         figures, reason = self._figures.of({**dict(zip(study.varied, values, strict=True)), **outputs})
         kept = {TIME: plan.times, **{name: outputs[name] for name in plan.kept}}
-        return {
+        columns = {
             **dict(zip(plan.figures, figures, strict=True)),
             STATUS: INCOMPLETE if reason else DONE,
             REASON: reason or None,
             TRAJECTORY: {name: values[self._points] for name, values in kept.items()},
-            TURNED: any(np.any(np.abs(outputs[name]) > 0.5 * np.pi) for name in study.angles),
         }
+        return Run(columns, any(np.any(np.abs(outputs[name]) > 0.5 * np.pi) for name in study.angles))
 
 
 class Rows(NamedTuple):
@@ -76,9 +80,9 @@ def rows_of(study: Study, runs: Callable[[Array], Sequence[Run]], first: int, va
     found = runs(values)
     seconds = perf_counter() - began
     rows = [
-        {RUN: number, **dict(zip(study.varied, own, strict=True)), **run}
+        {RUN: number, **dict(zip(study.varied, own, strict=True)), **run.columns}
         for number, own, run in zip(count(first), values.tolist(), found, strict=False)
     ]
     table = pa.Table.from_pylist(rows, pa.schema(kinds))
-    failed, turned = sum(run[STATUS] == FAILED for run in found), sum(run.get(TURNED, False) for run in found)
+    failed, turned = sum(run.columns[STATUS] == FAILED for run in found), sum(run.turned for run in found)
     return Rows(parquet(table, study.about, first), failed, turned, seconds)

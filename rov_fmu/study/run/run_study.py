@@ -84,15 +84,16 @@ def do_study(
         WORKERS.checked("workers", workers)
     if engine not in (None, *get_args(Engine)):
         raise InputError(f"engine = {shown(engine)}: must be one of {', '.join(get_args(Engine))}")
+    has_scheduler = scheduler is not None
     for is_wrong, words in (
-        (scheduler and workers, "leave --workers out, because the scheduler already has its workers"),
-        (scheduler and engine == "lanes", "leave --scheduler out, because --engine lanes runs in this process"),
+        (has_scheduler and workers, "leave --workers out, because the scheduler already has its workers"),
+        (has_scheduler and engine == "lanes", "leave --scheduler out, because --engine lanes runs in this process"),
         (merge and part, "leave --part out, because --merge does no run"),
     ):
         if is_wrong:
             raise InputError(f"study: {words}")
     plan = load_plan(path)
-    model = _model(plan, path, engine or ("lanes" if plan.vehicle and not scheduler else "fmu"))
+    model = _model(plan, path, engine or ("lanes" if plan.vehicle and not has_scheduler else "fmu"))
     study, design = prepare(plan, path, model)
     for warning in study.about["warnings"]:
         on_warning(warning)
@@ -104,7 +105,7 @@ def do_study(
             store.check_complete(study.about)
         work = Work(study, design, store, missing, span[1] - span[0], on_progress)
         try:
-            if missing and scheduler:
+            if missing and scheduler is not None:
                 from rov_fmu.study.run.cluster import do_on_cluster
 
                 do_on_cluster(work, scheduler)
