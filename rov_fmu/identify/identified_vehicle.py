@@ -312,7 +312,8 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     def has(part: Part, key: str) -> bool:
         if isinstance(part, Curve) and part.name in table.known.own_curves:
             shared = table.layout.curves_by_name[table.known.own_curves[part.name][0]]
-            ahead = key.removesuffix(REVERSE)  # its ratio astern concerns the loss with the speed of advance, too
+            ahead = key.removesuffix(REVERSE)
+            # The ratio of the thrust astern is one of d, too: where the others have one d both ways, this one has two.
             return key in part.keys and (ahead in OWN_KEYS or has(shared, ahead if ahead == "d" else key))
         name = part.coefficient(key)
         if key not in part.keys or name in given:

@@ -208,8 +208,7 @@ def _searched_for_structure(
 
     def searched(plain: StructureFit, before: StructureSearch | None = None) -> StructureSearch:
         size = len(plain.minimum.z) * sum(len(one.innovations) for one in plain.minimum.data)
-        is_first = plain.objective.is_thinned
-        search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size, is_first=is_first)
+        search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size)
         if before:
             search.begin_with(before)
         search.run()

@@ -235,13 +235,13 @@ def _of_lost(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
 
 
 def _of_settled(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
-    """Return each file with the time since the begin of the log from which its velocities count."""
+    """Return each file with the time since the start of the log from which its velocities count."""
     some = (one for one in logs if one.file in of)
     return {"of": listed(f"{one.file} (until {one.settled - one.log.begin:.1f} s)" for one in some)}
 
 
 def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
-    """Return each file whose commands do not always act, with the times since its begin between which they do."""
+    """Return each file whose commands do not always act, with the times since its start between which they do."""
     assert isinstance(start, tuple)
     some, words = {one.file: one for one in logs}, []
     for file, (begin, end) in zip(of, start, strict=True):

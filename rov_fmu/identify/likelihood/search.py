@@ -510,8 +510,10 @@ def fitted(
         end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False, promises=promises)
         quick = evidence(thinned, end)
         if quick > enough:
-            objective = thinned if plain.is_thinned else applied(plain, starts)
-            end = end if plain.is_thinned else minimise(objective, scaled(objective, end.z), last=False)
+            objective = thinned
+            if not plain.is_thinned:
+                objective = applied(plain, starts)
+                end = minimise(objective, scaled(objective, end.z), last=False)
             rows = {suspect: row_of(objective, suspect) for suspect in starts}
             ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
             return StructureFit(ends, objective, end, evidence(objective, end) + prior, quick)
@@ -571,13 +573,11 @@ class StructureSearch:
         plain: StructureFit,
         on_fit: Callable[[], None] = lambda: None,
         most: float = inf,
-        *,
-        is_first: bool = False,
     ) -> None:
         """`plain` is the fit without hypotheses; `on_fit` is called before each other fit. A search for what is wrong
-        with a model along all axes ends after `most` fits. A first search on thinned logs ends as soon as something
-        explains an axis: another one goes on from there with all samples."""
-        self.plain, self.on_fit, self.most, self.is_first = plain, on_fit, most, is_first
+        with a model along all axes ends after `most` fits. One on thinned logs ends as soon as something explains an
+        axis: another one goes on from there with all samples."""
+        self.plain, self.on_fit, self.most = plain, on_fit, most
         self.has_ended = False
         """True if it was late, and nothing had explained the errors along any axis in a round."""
         self.now = plain
@@ -589,7 +589,7 @@ class StructureSearch:
         """The hypotheses that were more probable than others, but do not explain the errors over 10 s."""
 
     def begin_with(self, other: "StructureSearch") -> None:
-        """Begin with what a search on thinned logs found. What they exclude is not fitted again."""
+        """Begin with what a search on thinned logs found. The sets that it gave up are not fitted again."""
         starts = other.now.starts
         self.tried |= {key: None for key, fit in other.tried.items() if not fit}
         if starts and (fit := fitted(other.now, self.plain.objective, starts, self._prior(starts))):
@@ -614,7 +614,7 @@ class StructureSearch:
         """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
         for number in rounds:
             self.has_ended = number > 0 and self._is_over
-            if self.has_ended or (self.is_first and not self.now.is_hopeless):
+            if self.has_ended or (self.plain.objective.is_thinned and not self.now.is_hopeless):
                 break
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)

@@ -143,7 +143,7 @@ def _disturbance(
 
 
 def acting_since(time: Array, clear: Flags, begin: float) -> float | None:
-    """Return from when on a slow process acts, s after the begin of the log; None if it acts from the first of n
+    """Return from when on a slow process acts, s after the start of the log's file; None if it acts from the first of n
     samples on, or comes and goes.
 
     `clear` is true where it exceeds twice its own uncertainty, which it does now and then by chance. So the time counts

@@ -1049,6 +1049,7 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch
         "rov_fmu.identify.likelihood.search.applied", lambda plain, starts, **_: applied(plain, starts, thinned=True)
     )
     quick = applied(reversed_model, {}, thinned=True)
+    quick.is_thinned = False  # it stands for all samples
     near = minimise(quick, start_of(quick), enough=8.0, last=False)
     start = evidence(quick, near)
     search = StructureSearch(StructureFit({}, quick, near, start, start))
