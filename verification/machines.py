@@ -117,7 +117,7 @@ def _with_other_digits(folder: Path) -> None:
     def other(number: re.Match[str]) -> str:
         return repr(float(number[0]) * (1.0 + _LAST_DIGIT * float(random.choice([-1.0, 1.0]))))
 
-    for path in folder.glob("dive_*.csv"):
+    for path in sorted(folder.glob("dive_*.csv")):
         head, *lines = path.read_text(encoding="utf-8").splitlines()
         path.write_text("\n".join([head, *(_NUMBER.sub(other, line) for line in lines), ""]), encoding="utf-8")
 

@@ -23,6 +23,8 @@ LEAST_SAMPLES = 20
 
 _TURN = 2.0 * pi + 0.3
 """The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
+_DECIMALS = 12
+"""The decimal places of a command. What is beyond them is rounding."""
 _LONG, _LONG_INTERVALS, _CHANGING, _REGULAR = 1.0, 10.0, 0.9, 2.0
 """Commands are told only where they change if two conditions hold. Somewhere no command comes for longer than the first
 number, s, and for longer than the second number of usual intervals of the measurements. And either at least the third
@@ -165,7 +167,11 @@ class Commands:
 
     @classmethod
     def of_rows(cls, thrusters: Sequence[str], rows: Array, values: Array, source: Source) -> "Commands":
-        """Return the changes in rows of commands: `rows` has n times (s), `values` is n x thrusters within ±1."""
+        """Return the changes in rows of commands: `rows` has n times (s), `values` is n x thrusters within ±1.
+
+        Values that differ by rounding alone are the same command.
+        """
+        values = np.round(values, _DECIMALS)
         changes = np.vstack([np.ones((1, len(thrusters)), bool), values[1:] != values[:-1]])
         row, thruster = np.nonzero(changes)
         since = rows[np.maximum(row - 1, 0)]

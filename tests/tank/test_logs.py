@@ -151,6 +151,14 @@ def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) ->
     assert ends("time [s],u_ahead [1],u_turn [1],heading [deg]", rows) == pytest.approx([1.0, 0.45])
 
 
+def test_a_command_that_differs_by_rounding_is_held(tmp_path: Path) -> None:
+    half = [0.5 + (-1) ** n * 1e-16 for n in range(N - 20)]
+    rows = [f"{n / 10},{value!r},{n}" for n, value in enumerate([0.0] * 20 + half)]
+    found = read(tmp_path, "time [s],u_t [1],depth [m]", rows).log.commands
+    assert found is not None
+    assert found.time[found.thruster == found.thrusters.index("t")] == pytest.approx([0.0, 2.0])
+
+
 # ---- Pulses ----------------------------------------------------------------------------------------------------------
 
 
