@@ -578,8 +578,6 @@ class StructureSearch:
         with a model along all axes ends after `most` fits. One on thinned logs ends as soon as something explains an
         axis: another one goes on from there with all samples."""
         self.plain, self.on_fit, self.most = plain, on_fit, most
-        self.has_ended = False
-        """True if it was late, and nothing had explained the errors along any axis in a round."""
         self.now = plain
         """The fit with the hypotheses that won."""
         self.tried: dict[frozenset[Suspect], StructureFit | None] = {frozenset(): plain}
@@ -613,8 +611,8 @@ class StructureSearch:
     def _search(self, rounds: Iterable[int]) -> None:
         """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
         for number in rounds:
-            self.has_ended = number > 0 and self._is_over
-            if self.has_ended or (self.plain.objective.is_thinned and not self.now.is_hopeless):
+            is_explained = self.plain.objective.is_thinned and not self.now.is_hopeless
+            if is_explained or (number > 0 and self.has_ended):
                 break
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
@@ -623,7 +621,7 @@ class StructureSearch:
             self.now = self._with_needed(best)
 
     @property
-    def _is_over(self) -> bool:
+    def has_ended(self) -> bool:
         """True if a model that nobody could use has taken enough fits. They are counted and not timed, because the
         result must not depend on the machine."""
         return len(self.tried) > self.most and self.now.is_hopeless
@@ -753,7 +751,7 @@ class StructureSearch:
             if gain < won - _FAR:
                 continue
             # What explains a model that is wrong along all axes is far better, also on few samples.
-            rise = _FAR if self._is_over else -WINS
+            rise = _FAR if self.now.is_hopeless else -WINS
             enough = max(one.quick for one in (self.now, *fits)) + rise
             self.on_fit()
             fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)

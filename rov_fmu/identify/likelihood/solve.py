@@ -159,17 +159,20 @@ def least_from(objective: Objective, start: Array, on_step: OnStep = lambda _: N
     """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
     In the valley between both, J has a kink wherever the dead band passes a command of the tests. A fit that will not
-    come below `than` is given up.
+    come below `than`, or the second one below the first, is given up.
     """
 
-    def promises(end: Minimum, gain: float) -> bool:
-        return end.value - REST * gain < than
+    def least(start: Array, than: float, on_step: OnStep) -> Minimum:
+        def promises(end: Minimum, gain: float) -> bool:
+            return end.value - REST * gain < than
 
-    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False, promises=promises)
+        return minimise(objective, start, on_step=on_step, enough=QUICK, last=False, promises=promises)
+
+    end = least(start, than, on_step)
     larger = objective.table.with_larger_dead_bands(end.z)
     if end.value > than or np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=QUICK, last=False)
+    other = least(larger, end.value, lambda step: on_step(step + MOST_STEPS))
     return min(end, other, key=lambda found: found.value)
 
 

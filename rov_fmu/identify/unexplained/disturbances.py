@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior, around
-from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
+from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.io.groups import grouped
@@ -73,8 +73,9 @@ def unknown_forces(objective: Objective, runs: Sequence[FilterRun]) -> Iterator[
 def _evidence(objective: Objective, best: Minimum, index: int, steps: int) -> float:
     """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it, in some steps.
 
-    The fit ends early where strong evidence is certain: the minimum within reach is not low enough. The information
-    about the other parameters is taken to be the same without it, because that about small sizes is rough.
+    The fit ends as soon as it is certain whether the evidence is strong: where the minimum within reach is not low
+    enough, or where J is low enough already. The information about the other parameters is taken to be the same without
+    it, because that about small sizes is rough.
     """
     without, with_it = objective.without([index]), evidence(objective, best)
 
@@ -84,10 +85,13 @@ def _evidence(objective: Objective, best: Minimum, index: int, steps: int) -> fl
     z = np.clip(best.z, without.low, without.high)
     try:
         end = replace(best, z=z, value=without.value(z, objective.runs(z, best.runs)))
-        if gain(end) > KEPT:
-            end = minimise(
-                without, z, near=best.data, most=steps, last=False, promises=lambda one, _: gain(one) <= KEPT
-            )
+        for n in range(steps):
+            start, near = end, () if n else best.data
+            if gain(start) <= KEPT:
+                break
+            end = minimise(without, start.z, near=near, most=1, last=False, promises=lambda one, _: gain(one) <= KEPT)
+            if n and start.value - end.value < ENOUGH:
+                break
         return gain(end)
     except DivergedError:
         return inf
