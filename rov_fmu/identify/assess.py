@@ -27,6 +27,9 @@ _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
 ROCKING = CONSTANTS["rocking"].value
 """No V_ss is claimed to better than this where the vehicle may have rocked unseen."""
+_BY_DRAG = np.array([1.0, 1.0, 2.0, 1.0])
+"""How much V_ss, the time, the way and the time with the lag change with quadratic drag, relative to V_ss: its square
+and that of the time are inversely proportional to this drag, and so is the way."""
 _STOPPED = 0.1
 _GRID = np.linspace(0.0, 1.0, 101)
 """The commands among which the one is found that holds a speed."""
@@ -146,8 +149,9 @@ def answers(
     """Return how fast, how long and how far the vehicle goes, for some commands of an axis.
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit, and `tested` is
-    in this unit. The values are those of the vehicle file, and each interval contains those of all posteriors; that of
-    V_ss is never narrower than `least`. They are wider for commands beyond the strongest tested one.
+    in this unit. The values are those of the vehicle file, and each interval contains those of all posteriors. It is
+    never narrower than what drag does that changes V_ss by `least`, and wider for commands beyond the strongest tested
+    one.
 
     Where drag has another power, the file has the nearest quadratic drag up to the largest tested speeds, `speeds`. An
     interval reaches as far to either side of the value as this drag changes the answer.
@@ -175,7 +179,7 @@ def answers(
         variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
         variances += beyond[:, None]
         half = np.minimum(QUANTILE * np.sqrt(variances), _WIDEST_HALF)
-        half[:, 0] = np.maximum(half[:, 0], least)
+        half = np.maximum(half, least * _BY_DRAG[: half.shape[1]])
         ends += [middle - half, middle + half, own - misfit, own + misfit]
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))

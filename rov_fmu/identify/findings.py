@@ -179,8 +179,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
         "rocking": (
-            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
-            "better than 3 %"
+            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no speed and no time is "
+            "claimed to better than 3 %, and no stopping distance to better than 6 %"
         ),
         "estimator": (
             "{axes}: the velocity of the estimator wanders by {size} (RMS) beside its position. The fit takes this for "

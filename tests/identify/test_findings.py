@@ -374,7 +374,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "rocking",
         quiet(folder=replace(quiet().folder, rows={})),
-        "surge: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to",
+        "surge: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no speed and",
         quiet(),
     ),
     (

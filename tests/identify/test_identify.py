@@ -281,6 +281,23 @@ def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: P
     assert any(line.startswith("log_heave_2.csv") for line in made.facts)
 
 
+def test_a_vehicle_that_rocked_unseen_is_within_the_intervals(tmp_path: Path) -> None:
+    """Rocking raised the drag of the dives by 4 %. Speeds, times and ways are those of the vehicle that is level."""
+    path, random = folder_of(tmp_path, KNOWN, FORCES), np.random.default_rng(0)
+    rocking = TRUTH.with_(**{name: 1.04 * TRUTH[name] for name in ("a_d_w", "b_d_w")})
+    for n, plan in enumerate(PLANS["heave"]):
+        write_log(path, str(n), run(rocking, HEAVE, plan, 5.0).noisy(random))
+        log = path / f"log_heave_{n}.csv"
+        text = log.read_text(encoding="utf-8").replace("command", "u_t")
+        log.rename(path / f"dive_{n}.csv").write_text(text, encoding="utf-8")
+    (heave,) = identify(load_tests(path)).axes
+    for answer in (one for one in heave.answers if one.command in COMMANDS):
+        V_ss, Tau = TRUTH.response(HEAVE, answer.command)
+        truth = V_ss, Tau, stop(heave, V_ss)
+        for true, (_, (low, high)) in zip(truth, (answer.steady, answer.rise, answer.stop), strict=True):
+            assert low <= true <= high, answer
+
+
 def test_unseen_logs_are_predicted_and_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     """Each log is predicted from the other one: over its length, and anew after each 10 s."""
     predictions = of_axis(of_logs, HEAVE).predictions
