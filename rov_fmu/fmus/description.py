@@ -10,7 +10,7 @@ from typing import Any
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits
 from rov_fmu.io.messages import FileError, brief, reason_of, shown
-from rov_fmu.io.reading import root_of_xml, too_large
+from rov_fmu.io.reading import check_size, root_of_xml
 
 TIME_LIMIT = 60.0
 """The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
@@ -77,8 +77,8 @@ def _root(folder: str) -> Any:
     """Return the root element of the model description, which FMPy can read in a short time. Raises ValueError."""
     for name in (_DESCRIPTION, "sources/buildDescription.xml"):
         path = Path(folder, name)
-        if path.is_file() and (size := path.stat().st_size) > _MOST_BYTES:
-            raise ValueError(f"{name} {too_large(size, _MOST_BYTES)}")
+        if path.is_file():
+            check_size(name, path.stat().st_size, _MOST_BYTES, ValueError)
     path = Path(folder, _DESCRIPTION)
     if not path.is_file():
         raise ValueError("there is no such file in the FMU")

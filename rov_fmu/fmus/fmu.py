@@ -20,7 +20,7 @@ from rov_fmu.fmus.variable import Described
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
+from rov_fmu.io.reading import check_size, read_bytes, root_of_xml
 
 _TERMINALS = f"{FOLDER}/terminalsAndIcons.xml"
 _MOST_BYTES = 4_000_000
@@ -61,8 +61,7 @@ class Fmu(Described):
         with opened_archive(BytesIO(self.content), self.path) as zipped:
             if _TERMINALS not in zipped.namelist():
                 return {}
-            if (size := zipped.getinfo(_TERMINALS).file_size) > _MOST_BYTES:
-                raise FileError(f"{where} {too_large(size, _MOST_BYTES)}")
+            check_size(where, zipped.getinfo(_TERMINALS).file_size, _MOST_BYTES)
             content = zipped.read(_TERMINALS)
         try:
             root = root_of_xml(content)

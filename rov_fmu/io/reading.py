@@ -61,17 +61,17 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = _MO
     """Return the content of a file. Raises `kind` if it cannot be read, or has more bytes than `most`."""
     with open_file(path, kind) as file:
         size = os.fstat(file.fileno()).st_size
-        if size > most:
-            raise kind(f"{path}: {too_large(size, most)}")
+        check_size(f"{path}:", size, most, kind)
         content = file.read(size + 1)
         if len(content) > size:
             raise kind(f"{path}: cannot be read: it has more bytes than its size, {size}")
         return content
 
 
-def too_large(size: int, most: int) -> str:
-    """Return why a file is not read that has more bytes than `most`."""
-    return f"has {size:,} bytes; at most {most:,} are read"
+def check_size(where: str, size: int, most: int, kind: type[Exception] = FileError) -> None:
+    """Raise `kind`, with a message that begins with `where`, if a file has more bytes than `most`."""
+    if size > most:
+        raise kind(f"{where} has {size:,} bytes; at most {most:,} are read")
 
 
 def read_text(path: Path, kind: type[FileError] = FileError, *, most: int = _MOST_BYTES) -> str:

@@ -9,8 +9,8 @@ from rov_fmu.fmu.archive import META_DATA, directory, local_header
 from rov_fmu.fmu.meta_data import ARCHIVE, BEFORE, FILES, GENERATOR, INPUTS, own_hash
 from rov_fmu.fmus.unpacking import check_order, opened_archive
 from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.messages import FileError, ProofError, brief, shown
-from rov_fmu.io.reading import hash_of, open_file, root_of_xml, too_large
+from rov_fmu.io.messages import ProofError, brief, shown
+from rov_fmu.io.reading import check_size, hash_of, open_file, root_of_xml
 from rov_fmu.prove.signature import check_signature
 
 _MOST_BYTES = 20_000_000
@@ -64,8 +64,7 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
 def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
     """Return what the meta-data say. Raises FileError."""
     where = f"{fmu}: {META_DATA}"
-    if (size := archive.getinfo(META_DATA).file_size) > _MOST_BYTES:
-        raise FileError(f"{where}: {too_large(size, _MOST_BYTES)}")
+    check_size(f"{where}:", archive.getinfo(META_DATA).file_size, _MOST_BYTES)
     try:
         root = root_of_xml(archive.read(META_DATA))
     except (ValueError, zipfile.BadZipFile) as error:

@@ -14,7 +14,7 @@ from lxml import etree
 from rov_fmu.fmu.archive import MANIFEST
 from rov_fmu.io.csv_table import Series, finite, read_series
 from rov_fmu.io.messages import FileError, brief, shown
-from rov_fmu.io.reading import root_of_xml, too_large
+from rov_fmu.io.reading import check_size, root_of_xml
 
 DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
@@ -89,8 +89,7 @@ class _Member:
         path = self.folder / self.path
         if not path.is_file():
             raise self.error("there is no such file in the FMU")
-        if (size := path.stat().st_size) > _MOST_BYTES:
-            raise self.error(too_large(size, _MOST_BYTES))
+        check_size(f"{self}:", path.stat().st_size, _MOST_BYTES)
         try:
             return path.read_bytes().decode("utf-8-sig")
         except UnicodeDecodeError as error:

@@ -19,7 +19,7 @@ from rov_fmu.io.file_kinds import SYSTEM, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, shown
 from rov_fmu.io.paths import inside
-from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
+from rov_fmu.io.reading import check_size, read_bytes, root_of_xml
 from rov_fmu.io.templates import render
 
 PARAMETER_SET = "initial_values"
@@ -172,8 +172,7 @@ def _file(folder: Path, name: str) -> Path:
 def _root(folder: Path, name: str) -> Any:
     """Return the root element of a file of an unpacked system. Raises ValueError."""
     path = _file(folder, name)
-    if (size := path.stat().st_size) > _MOST_BYTES:
-        raise ValueError(f"{name} {too_large(size, _MOST_BYTES)}")
+    check_size(name, path.stat().st_size, _MOST_BYTES, ValueError)
     try:
         return root_of_xml(path.read_bytes())
     except ValueError as error:
