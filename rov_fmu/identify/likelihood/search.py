@@ -664,9 +664,9 @@ class StructureSearch:
         """Return False for a hypothesis whose number is at its bound, and for one about the thrust without which the
         errors of the fit are hardly larger.
 
-        The loss by errors is ln R, as in the score of predictions: it is 0 where noise alone is left (R = 1). A
-        hypothesis that explains the errors takes away at least half of it. A lag hardly shows in the errors over 10 s,
-        and J sees it, if the model is right about an axis.
+        The loss by errors is the sum of ln R of the axes that it acts on, as in the score of predictions: it is 0 where
+        noise alone is left (R = 1). A hypothesis that explains the errors takes away at least half of it. A lag hardly
+        shows in the errors over 10 s, and J sees it, if the model is right about an axis.
         """
         (kind, of), layout = suspect, self.now.objective.table.layout
         if self._is_at_bound(suspect):
@@ -677,12 +677,12 @@ class StructureSearch:
         ill = [t for t in layout.thrusters if t.name in of or not of]
         on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
         others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
-        worst_of = max(on, key=lambda axis: before[axis].ratio, default=None)
-        if worst_of is None:  # nothing tells these errors
+        if not on:  # nothing tells these errors
             return others
-        if before[worst_of].ratio <= min(USUAL, HYPOTHESES[kind].alarm):
+        if max(before[axis].ratio for axis in on) <= min(USUAL, HYPOTHESES[kind].alarm):
             return False
-        explains = after[worst_of].ratio ** 2 <= before[worst_of].ratio
+        old, new = (sum(log(max(fit[axis].ratio, 1.0)) for axis in on) for fit in (before, after))
+        explains = new <= 0.5 * old
         return others and explains and all(after[axis].ratio <= ALARM for axis in on)
 
     def _is_at_bound(self, suspect: Suspect) -> bool:
@@ -824,10 +824,10 @@ class StructureSearch:
         yield from ((sets[n], fall) for fall, n in order)
 
     def _least_fall(self, starts: Starts) -> float:
-        """Return by how much J must fall before a fit: by more than the prior asks of a set that wins, and than it did
-        before a fit that a hypothesis of the set made worse."""
+        """Return by how much J must fall before a fit: by more than half of what the prior asks of a set that wins, and
+        than it did before a fit that a hypothesis of the set made worse."""
         price = self._prior(self.now.starts) - self._prior(starts)
-        return max(price, self.lost.get(self._new(starts), -inf), 0.0)
+        return max(0.5 * price, self.lost.get(self._new(starts), -inf), 0.0)
 
     def _new(self, starts: Starts) -> Suspect | None:
         """Return the hypothesis of a set that is not among those that won; None if there is none."""

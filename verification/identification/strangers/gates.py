@@ -43,7 +43,7 @@ def stage(name: str, folders: Sequence[Judged]) -> dict[str, Any]:
     """Return what is kept of the drawn folders of a stage."""
     groups: dict[str, Counts] = {}
     kinds: dict[str, Counts] = {}
-    widths: dict[str, list[float]] = {"V_ss": [], "times": []}
+    widths: dict[str, list[float]] = {quantity: [] for quantity in QUANTITIES}
     offs = list[float]()
     for one in folders:
         for axis in one.axes:
@@ -55,7 +55,7 @@ def stage(name: str, folders: Sequence[Judged]) -> dict[str, Any]:
             if group == RIGHT:
                 offs += (number.off for number in axis.numbers)
                 for number in axis.numbers:
-                    widths["V_ss" if number.quantity == "V_ss" else "times"].append(number.half_width)
+                    widths[number.quantity].append(number.half_width)
     times = [[one.seconds for one in folders if one.count == count] for count in (2, 4)]
     causes = [bool(is_true) for one in folders for cause, is_true in one.causes if not cause.startswith(_LAG)]
     ill = [one for one in folders if BY_NAME[one.kind].causes != "-"]
@@ -134,8 +134,9 @@ def gates(some: Sequence[Mapping[str, Any]]) -> Table:
     add(f"answers of {RIGHT} inside; median error in half-widths", "98 %, 0.45", *map(inside, some))
     add(f"*good* of {RIGHT}", "at least 85 %", *(are_good(one, RIGHT) for one in some))
     add(f"*good* of {NEAR_FIT}", "at least 85 %", *(are_good(one, NEAR_FIT) for one in some))
-    add(f"V_ss of {RIGHT}, median", "at most ±3.5 %", *(_percent(one["widths"]["V_ss"]) for one in some))
-    add("their times and distances", "at most ±5 %", *(_percent(one["widths"]["times"]) for one in some))
+    widths = (f"V_ss of {RIGHT}, median", "±3.5 %"), ("their times", "±5 %"), ("their stopping distances", "±10 %")
+    for (words, most), quantity in zip(widths, QUANTITIES, strict=True):
+        add(words, f"at most {most}", *(_percent(one["widths"].get(quantity)) for one in some))
     add("true causes of those told, but for a lag", "98 %", *(_share(*one["causes"]) for one in some))
     add("vehicles with a fault whose cause is told", "90 %", *(_share(*one["named"]) for one in some))
     seconds = (
