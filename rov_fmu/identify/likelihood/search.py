@@ -799,8 +799,9 @@ class StructureSearch:
     def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
         """Yield the best sets at either of two points with the fall of J at the better one, the largest fall first.
 
-        Of the starts of one set, the best one counts. Where J rises by much at the first point, whose noise is loud, it
-        rises more at the second one.
+        If J falls enough for none, it is the best one alone: it may rise a little also for what is true. Of the starts
+        of one set, the best one counts. Where J rises by much at the first point, whose noise is loud, it rises more at
+        the second one.
         """
         now = self.now
         points = self._rough, comparison(self.plain.objective, now.starts, now.minimum.z)
@@ -810,7 +811,7 @@ class StructureSearch:
             found = before[point] - points[point](some)
             return -inf if isnan(found) else found
 
-        found = ([rough, fall(some, 1) if rough > -_FAR else -inf] for some in sets for rough in [fall(some, 0)])
+        found = [[rough, fall(some, 1) if rough > -_FAR else -inf] for some in sets for rough in [fall(some, 0)]]
         falls = {n: some for n, some in enumerate(found) if max(some) > self._least_fall(sets[n])}
         chosen = dict[frozenset[Suspect], int]()
         for point in (0, 1):
@@ -820,14 +821,18 @@ class StructureSearch:
                     best.setdefault(frozenset(sets[n]), n)
             for key, n in islice(best.items(), _FITTED):
                 chosen.setdefault(key, n)
+        if not chosen:
+            untried = ((n, some) for n, some in enumerate(found) if self._new(sets[n]) not in self.lost)
+            falls = {n: some for n, some in untried if any(some) and max(some) > -_FAR}
+            chosen = {frozenset(sets[n]): n for n in sorted(falls, key=lambda n: max(falls[n]))[-1:]}
         order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
         yield from ((sets[n], fall) for fall, n in order)
 
     def _least_fall(self, starts: Starts) -> float:
-        """Return by how much J must fall before a fit: by more than half of what the prior asks of a set that wins, and
-        than it did before a fit that a hypothesis of the set made worse."""
+        """Return by how much J must fall before a fit: by more than the prior asks of a set that wins, and than it did
+        before a fit that a hypothesis of the set made worse."""
         price = self._prior(self.now.starts) - self._prior(starts)
-        return max(0.5 * price, self.lost.get(self._new(starts), -inf), 0.0)
+        return max(price, self.lost.get(self._new(starts), -inf), 0.0)
 
     def _new(self, starts: Starts) -> Suspect | None:
         """Return the hypothesis of a set that is not among those that won; None if there is none."""

@@ -1017,6 +1017,22 @@ def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(revers
     assert [some for some, _ in search._ranked(sets)] == [first, second]
 
 
+def test_the_best_one_is_fitted_where_j_falls_enough_for_none(
+    reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What changes nothing, and what lost before, is not."""
+    quick = applied(reversed_model, {}, thinned=True)
+    search = StructureSearch(StructureFit({}, quick, minimise(quick, quick.mean, most=0, last=False), 0.0, 0.0))
+    monkeypatch.setattr(search, "_least_fall", lambda _: np.inf)
+    best, second, idle = {REVERSED: None}, {DEAD: 0.5}, {SLEW: 1e6}
+    sets: list[Starts] = [second, best, idle]
+    assert [some for some, _ in search._ranked(sets)] == [best]
+    search.lost[REVERSED] = 1.0
+    assert [some for some, _ in search._ranked(sets)] == [second]
+    search.lost[DEAD] = 1.0
+    assert [*search._ranked(sets)] == []
+
+
 @pytest.mark.parametrize(("again", "names"), [(38.0, {REVERSED}), (20.0, {REVERSED, DEAD})])
 def test_another_minimum_is_no_evidence_for_a_hypothesis(
     again: float, names: set[Suspect], reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
