@@ -750,8 +750,10 @@ class StructureSearch:
         for starts, gain in sorted(self._promising(), key=lambda one: self._rows(one[0])):
             if gain < won - _FAR:
                 continue
-            # What explains a model that is wrong along all axes is far better, also on few samples.
-            rise = _FAR if self.now.is_hopeless else -WINS
+            # What explains a model that is wrong along all axes is far better, also on few samples. So must be what J
+            # did not promise.
+            is_promised = gain == -inf or gain > self._least_fall(starts)
+            rise = -WINS if is_promised and not self.now.is_hopeless else _FAR
             enough = max(one.quick for one in (self.now, *fits)) + rise
             self.on_fit()
             fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)
