@@ -750,8 +750,8 @@ class StructureSearch:
         for starts, gain in sorted(self._promising(), key=lambda one: self._rows(one[0])):
             if gain < won - _FAR:
                 continue
-            # What explains a model that is wrong along all axes is far better, also on few samples. So must be what J
-            # did not promise.
+            # What explains a model that is wrong along all axes is far better, also on few samples. A set of which J
+            # promised too little before the fit has to be far better, too.
             is_promised = gain == -inf or gain > self._least_fall(starts)
             rise = -WINS if is_promised and not self.now.is_hopeless else _FAR
             enough = max(one.quick for one in (self.now, *fits)) + rise
@@ -824,8 +824,8 @@ class StructureSearch:
             for key, n in islice(best.items(), _FITTED):
                 chosen.setdefault(key, n)
         if not chosen:
-            untried = ((n, some) for n, some in enumerate(found) if self._new(sets[n]) not in self.lost)
-            falls = {n: some for n, some in untried if any(some) and max(some) > -_FAR}
+            others = ((n, some) for n, some in enumerate(found) if self._new(sets[n]) not in self.lost)
+            falls = {n: some for n, some in others if any(some) and max(some) > -_FAR}
             chosen = {frozenset(sets[n]): n for n in sorted(falls, key=lambda n: max(falls[n]))[-1:]}
         order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
         yield from ((sets[n], fall) for fall, n in order)
