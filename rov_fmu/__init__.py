@@ -18,7 +18,6 @@ HOMES = {
     name: f"rov_fmu.{module}"
     for module, names in {
         "bridges.gym": "RovEnv RovVectorEnv",
-        "bridges.jacobian": "StepJacobian step_jacobian",
         "bridges.mujoco": "load_mujoco",
         "build": "Built build_fmu",
         "c.compile": "BuildError OptionError",

@@ -2,8 +2,6 @@
 
 from rov_fmu.bridges.gym import RovEnv as RovEnv
 from rov_fmu.bridges.gym import RovVectorEnv as RovVectorEnv
-from rov_fmu.bridges.jacobian import StepJacobian as StepJacobian
-from rov_fmu.bridges.jacobian import step_jacobian as step_jacobian
 from rov_fmu.bridges.mujoco import load_mujoco as load_mujoco
 from rov_fmu.build import Built as Built
 from rov_fmu.build import build_fmu as build_fmu

@@ -27,13 +27,12 @@ from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import FmuContent, native_content, python_content, web_module
 from rov_fmu.fmu.meta_data import meta_data
-from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmus.fmu import Fmu
 from rov_fmu.fmus.instance import RunError
 from rov_fmu.io.file_kinds import FMU
 from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
-from rov_fmu.io.output import Output, check_targets, sealed, write_whole
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import open_file
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.signature import check_private_key, check_signature, signature_path, signed
@@ -75,7 +74,6 @@ def build_fmu(
     backend: str = "native",
     fmi: int = 2,
     interface: str | None = None,
-    osp: bool = False,
     sign: Path | None = None,
     force: bool = False,
     inputs: Sequence[Path] = (),
@@ -88,10 +86,9 @@ def build_fmu(
     - `output`: the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
     - `platforms`: one or several of PLATFORMS, or `host` for this machine; by default those with 64 bits.
     - `backend`: `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms.
-    - `fmi`: the version of FMI, 2 or 3. `pythonfmu` and `osp` need 2.
+    - `fmi`: the version of FMI, 2 or 3. `pythonfmu` needs 2.
     - `interface`: `cs` for Co-Simulation, `me` for Model Exchange, or `both`, which is the default; the FMU in pure
       Python has only `cs`, and so has that of a vehicle with `current = "passes"`.
-    - `osp`: True to also write <identifier>_OspModelDescription.xml to the folder of the FMU.
     - `sign`: the file of a private key of OpenSSH, with which ssh-keygen signs the FMU in <output>.sig.
     - `force`: True to replace files that this program did not write, or that have changed since.
     - `inputs`: further files that must not be overwritten, like those that the vehicle names.
@@ -104,19 +101,15 @@ def build_fmu(
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
     vehicle cannot be read, or if `output` does not end with .fmu; WriteError, an OSError, if a path cannot be written.
     """
-    _check_options(vehicle, backend, fmi, interface, osp=osp)
+    _check_options(vehicle, backend, fmi, interface)
     native = backend == "native"
     interface = interface or ("both" if native and not vehicle.layout.before else "cs")
     version = {2: "", 3: ".fmi3"}[fmi]
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
-    beside = []
-    if osp:
-        groups = sealed(osp_model_description(vehicle.layout).decode(), "build").encode()
-        beside.append(Output(osp_path(output, vehicle.identifier), groups))
     if sign:
         check_private_key(sign)
     signature = signature_path(output)
-    targets = [(output, FMU), *((other.path, "") for other in beside), (signature if sign else None, "")]
+    targets = [(output, FMU), (signature if sign else None, "")]
 
     def is_ours(path: Path) -> bool:
         """Return True for an FMU of this program that nobody has changed since, and for the signature that fits it."""
@@ -147,8 +140,7 @@ def build_fmu(
     files = with_binaries(content, binaries, fmi)
     packed = archive(files, partial(meta_data, vehicle, files))
     lost = sorted(_platforms_in(output) - _folders(files))
-    if sign:
-        beside.append(Output(signature, signed(packed, sign)))
+    beside = [Output(signature, signed(packed, sign))] if sign else []
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
     written = write_whole(draft, *beside, force=force, is_ours=is_ours)
@@ -197,7 +189,7 @@ def _only_here(fmi: int) -> str | None:
     return host
 
 
-def _check_options(vehicle: object, backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:
+def _check_options(vehicle: object, backend: str, fmi: int, interface: str | None) -> None:
     """Raise InputError about the vehicle, or OptionError about an option that is invalid, alone or beside others."""
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
@@ -215,10 +207,6 @@ def _check_options(vehicle: object, backend: str, fmi: int, interface: str | Non
     if vehicle.layout.before and interface not in (None, "cs"):
         reason = "it changes velocities, which an importer of Model Exchange owns: Co-Simulation (cs)"
         raise OptionError(f'--interface {interface}: current = "passes": {reason} alone')
-    if osp and interface == "me":
-        raise OptionError("--interface me: libcosim and the OSP tools, which --osp is for, run Co-Simulation alone")
-    if fmi == 3 and osp:
-        raise OptionError("--fmi 3: libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone")
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:

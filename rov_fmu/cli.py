@@ -247,11 +247,6 @@ def _commands(context: click.Context) -> None:
     metavar="NAME",
     help=f"Platform to compile for: host, {', '.join(PLATFORMS)}. It may be repeated; the default is all with 64 bits.",
 )
-@click.option(
-    "--osp",
-    is_flag=True,
-    help="Also write <identifier>_OspModelDescription.xml (OSP-IS 1.0.1; FMI 2.0 only).",
-)
 @_file_option(
     "--sign",
     metavar="KEY",
@@ -370,7 +365,7 @@ def _list(folder: Path) -> None:
 )
 @_output_option(
     metavar="RESULT.csv",
-    help="Results to write (.csv, .parquet, or .mcap for Foxglove and PlotJuggler).",
+    help="Results to write (.csv or .parquet).",
 )
 @_file_option(
     "--plot",
@@ -439,18 +434,12 @@ def _warn(message: str) -> None:
     help="A log that identify reads, with the rov.toml beside it: the vehicle flies its commands beside what was "
     "measured.",
 )
-@_file_option(
-    "--identified",
-    metavar="LOGS.mcap",
-    help="What `identify --mcap` wrote: bands of the errors and unknown forces are shown.",
-)
 @_output_option(metavar="PAGE.html", help="Page to write; no browser is opened.")
 @_force_option()
 def _fly(
     vehicle: Path,
     against: Path | None,
     recording: Path | None,
-    identified: Path | None,
     output: Path | None,
     *,
     force: bool,
@@ -459,10 +448,8 @@ def _fly(
     from rov_fmu.interface.fly_command import open_in_browser, write_fly_page
     from rov_fmu.report.console import print_end
 
-    if identified and not recording:
-        raise click.UsageError("fly: --identified needs --recording, the log that it is about")
     with _warnings_printed():
-        files = write_fly_page([vehicle, against] if against else [vehicle], recording, identified, output, force=force)
+        files = write_fly_page([vehicle, against] if against else [vehicle], recording, output, force=force)
     if output:
         print_end(files, "open it in a browser")
     else:
@@ -499,8 +486,7 @@ def _fly(
 @_file_option(
     "--log",
     metavar="LOG.csv",
-    help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. Each restart of the autopilot "
-    "begins another log.",
+    help="Log to write, which identify reads. Each restart of the autopilot begins another log.",
 )
 @click.option("--force", is_flag=True, help="Replace logs that exist.")
 @click.option(
@@ -717,13 +703,6 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
     help="Do part K of N alone, as in --part 3/64, also beside others.",
 )
 @click.option("--merge", is_flag=True, help="Do no run. Check the files of all parts in RESULTS, and write the page.")
-@click.option(
-    "--mcap",
-    "run",
-    type=_number("the number of a run, from 0", 0, 10**9, int),
-    metavar="RUN",
-    help="Run to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a vehicle.",
-)
 @_force_option()
 def _study(plan: Path, output: Path, **options: Any) -> None:
     """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.
@@ -754,11 +733,6 @@ _tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type
     metavar="REPORT.html",
     help="Report to write, which a build puts into the FMU.",
 )
-@_file_option(
-    "--mcap",
-    metavar="LOGS.mcap",
-    help="File to write for Foxglove and PlotJuggler: commands, measurements, predictions, bands, unknown forces.",
-)
 @click.option(
     "--base",
     callback=_find_given,
@@ -771,7 +745,6 @@ def _identify(
     tests: tuple[Path, ...],
     output: Path | None,
     report: Path | None,
-    mcap: Path | None,
     base: Path | None,
     force: bool,
 ) -> None:
@@ -787,7 +760,7 @@ def _identify(
 
     with parts() as shown:
         identification, files = identify_tests(
-            tests, output, report, mcap, base=base, force=force, begin=shown.begin, on_answer=shown.tell
+            tests, output, report, base=base, force=force, begin=shown.begin, on_answer=shown.tell
         )
     print_identification(identification)
     name = identification.vehicle.identifier

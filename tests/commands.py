@@ -67,7 +67,6 @@ _SYSTEM = quote(str(ROOT / "tests" / "bridges" / "system" / "current.toml"))
 _TUNE = f"tune {quote(str(VIDEORAY))} --axis heave --command 0.3 --v-ss 0.2"
 WRITING = {
     ("build", "output"): Command("rov.fmu", f"build {_BARE} --platform host -o {{f}}/rov.fmu"),
-    ("build", "osp"): Command("bare_OspModelDescription.xml", f"build {_BARE} --platform host --osp -o {{f}}/rov.fmu"),
     ("simulate", "output"): Command("run.csv", f"simulate {_BARE} -o {{f}}/run.csv"),
     ("simulate", "plot"): Command("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
     ("fly", "output"): Command("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
@@ -77,10 +76,8 @@ WRITING = {
     ("prove", "report"): Command("proof.html", "prove {fmu} --report {f}/proof.html"),
     ("system", "output"): Command("my.ssp", f"system {_SYSTEM} -o {{f}}/my.ssp"),
     ("study", "output"): Command("study.html", "study {f}/plan.toml -o {f}"),
-    ("study", "run"): Command("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
     ("identify", "output"): Command("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
     ("identify", "report"): Command("report.html", f"identify {_FEW} --report {{f}}/report.html"),
-    ("identify", "mcap"): Command("logs.mcap", f"identify {_FEW} --mcap {{f}}/logs.mcap"),
     ("inspect", "report"): Command("page.html", f"inspect {_FEW} --report {{f}}/page.html"),
     ("tune", "output"): Command("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
 }
@@ -94,7 +91,6 @@ READING = {
     ("fly", "vehicle"): "fly videoray.toml",
     ("fly", "against"): "fly videoray --against refit.toml",
     ("fly", "recording"): "fly videoray --recording points.csv",
-    ("fly", "identified"): "fly videoray --recording points.csv --identified logs.mcap",
     ("sitl", "vehicle"): "sitl videoray.toml",
     ("export", "vehicle"): "export --to sdf videoray.toml",
     ("export", "gains"): "export videoray --to ardusub-gains --gains points.csv",

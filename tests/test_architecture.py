@@ -68,7 +68,6 @@ MAY_IMPORT = {
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/equation": 13,
-    "rov_fmu/fmu": 13,
     "rov_fmu/identify": 13,
     "rov_fmu/identify/likelihood": 13,
     "rov_fmu/io": 13,
@@ -81,7 +80,7 @@ LARGER_FOLDERS = {
     "tests/tank/readers": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
-    "tests/study": 14,
+    "tests/study": 13,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""
 

@@ -52,7 +52,7 @@ def fmus(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str 
     """Build the FMUs of vehicles that ship: FMI 2.0 with its OSP description, FMI 3.0, and the VideoRay's in Python."""
     for name in vehicles:
         vehicle = load_vehicle(SHIPPED[name])
-        build_fmu(vehicle, folder / f"{name}.fmu", platforms=platforms, osp=True)
+        build_fmu(vehicle, folder / f"{name}.fmu", platforms=platforms)
         build_fmu(vehicle, folder / f"{name}.fmi3.fmu", platforms=platforms, fmi=3)
     if "videoray" in vehicles:
         build_fmu(load_vehicle(SHIPPED["videoray"]), folder / "videoray.python.fmu", backend="pythonfmu")

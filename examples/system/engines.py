@@ -7,7 +7,6 @@ Each function gives the outputs at the end of every step, named as "rov.z".
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -24,7 +23,7 @@ from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-from .system import CONNECTIONS, OUTPUTS, SLAVES, STEP, STEPS, STOP, Values, parameter_sets, system_files
+from .system import CONNECTIONS, OUTPUTS, SLAVES, STEP, STEPS, STOP, Values, parameter_sets, system_file
 from .with_fmpy import fly
 
 Trajectory = dict[str, NDArray[np.float64]]
@@ -99,7 +98,7 @@ def fmpy(folder: Path, parameters: str) -> Trajectory:
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet, read_ssd
 
-    path = str(system_files(folder, parameters)[0])
+    path = str(system_file(folder, parameters))
     together = ParameterSet(name=parameters)
     for component in read_ssd(path).system.elements:
         for p in component.parameterBindings[0].parameterValues[0].parameters:
@@ -110,13 +109,13 @@ def fmpy(folder: Path, parameters: str) -> Trajectory:
 
 def in_30_lines(folder: Path, parameters: str) -> Trajectory:
     """Run FMPy from the SSP archive by with_fmpy.py."""
-    rows = list(fly(str(system_files(folder, parameters)[0]), STEP, STEPS))
+    rows = list(fly(str(system_file(folder, parameters)), STEP, STEPS))
     return {f"{c}.{name}": np.array([row[f"{c}.{name}"] for row in rows]) for c, name in NAMES}
 
 
-def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
-    """libcosim from the SSP archive, or from the OSP configuration, connected by variable groups."""
-    return by_libcosim(system_files(folder, parameters)[osp], NAMES, STEPS, osp=osp)
+def libcosim(folder: Path, parameters: str) -> Trajectory:
+    """libcosim from the SSP archive."""
+    return by_libcosim(system_file(folder, parameters), NAMES, STEPS)
 
 
 def by_libcosim(
@@ -124,7 +123,6 @@ def by_libcosim(
     names: Sequence[tuple[str, str]],
     steps: int,
     *,
-    osp: bool = False,
     starts: Mapping[tuple[str, str], float] = MappingProxyType({}),
 ) -> Trajectory:
     """Return some outputs of a system by libcosim, which knows the step.
@@ -137,8 +135,7 @@ def by_libcosim(
     from libcosimpy.CosimObserver import CosimObserver
 
     log_output_level(CosimLogLevel.WARNING)
-    open_file = CosimExecution.from_osp_config_file if osp else CosimExecution.from_ssp_file
-    execution = open_file(str(file))
+    execution = CosimExecution.from_ssp_file(str(file))
     index = {component: execution.slave_index_from_instance_name(component) for component, _ in names}
     reference = {c: {v.name.decode(): v.reference for v in execution.slave_variables(i)} for c, i in index.items()}
     for (component, name), value in starts.items():
@@ -154,7 +151,7 @@ def by_libcosim(
 
 def ecos(folder: Path, parameters: str) -> Trajectory:
     """Run Ecos from the SSP archive."""
-    return by_ecos(system_files(folder, parameters)[0], NAMES, STEPS, STEP)
+    return by_ecos(system_file(folder, parameters), NAMES, STEPS, STEP)
 
 
 def by_ecos(file: Path, names: Sequence[tuple[str, str]], steps: int, step: float) -> Trajectory:
@@ -194,6 +191,5 @@ ENGINES = {
     "FMPy, SSP": Engine(fmpy, "fmpy"),
     "FMPy, 30 lines": Engine(in_30_lines, "fmpy"),
     "libcosim, SSP": Engine(libcosim, "libcosimpy.CosimExecution"),
-    "libcosim, OSP": Engine(partial(libcosim, osp=True), "libcosimpy.CosimExecution"),
     "Ecos, SSP": Engine(ecos, "ecospy"),
 }

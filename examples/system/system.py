@@ -1,6 +1,5 @@
-"""The system as files: four FMUs; an SSP archive and an OSP configuration for each vehicle."""
+"""The system as files: four FMUs; an SSP archive for each vehicle."""
 
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -12,7 +11,7 @@ from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
 from rov_fmu.bridges.system.companion import companion
 from rov_fmu.bridges.system.companions.battery import Battery
 from rov_fmu.bridges.system.connections import Connection
-from rov_fmu.bridges.system.ssp import Component, System, ssp_content, write_osp
+from rov_fmu.bridges.system.ssp import Component, System, ssp_content
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -50,10 +49,6 @@ CONNECTIONS = {
     ("rov", "F_t"): ("battery", "F_t"),
     ("battery", "sag"): ("autopilot", "sag"),
 }
-# What stands for the connections from the autopilot to the ROV: a group of the OSP model descriptions.
-GROUPS = {"thruster_commands": ("autopilot", "rov")}
-
-OSP = "videoray_autopilot_OspModelDescription.xml"
 
 SLAVES: dict[str, type] = {"current": Current, "battery": Battery}
 FMUS = {
@@ -76,26 +71,21 @@ def parameter_sets() -> dict[str, dict[str, Values]]:
     return {name: {"rov": {**values, **TETHER}, **others} for name, values in vehicles.items()}
 
 
-def system_files(folder: Path, parameters: str) -> tuple[Path, Path]:
-    """The SSP archive and the OSP configuration of a parameter set; what tools look for holds the default one.
-
-    A parameter set is a system of its own: of several, tools take another one each, and they open one .ssd an archive.
-    """
-    suffix = "" if parameters == DEFAULT else f"_{parameters}"
-    return folder / f"{parameters}.ssp", folder / f"OspSystemStructure{suffix}.xml"
+def system_file(folder: Path, parameters: str) -> Path:
+    """The SSP archive of a parameter set, which is a system of its own: tools open one .ssd an archive."""
+    return folder / f"{parameters}.ssp"
 
 
 def build_system(folder: Path) -> None:
     """Write all files. Raises RuntimeError where an FMU cannot be built."""
     folder.mkdir(parents=True, exist_ok=True)
-    if main(["build", "--platform", "host", "--osp", "-o", str(folder / "videoray.fmu")]):
+    if main(["build", "--platform", "host", "-o", str(folder / "videoray.fmu")]):
         raise RuntimeError("videoray.fmu was not built")
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "current.py"), "-d", str(folder)]
     subprocess.run(build, check=True)
     (folder / FMUS["battery"]).write_bytes(companion("battery"))
     held = autopilot_of(load_vehicle(SHIPPED[DEFAULT]), STEP)
     (folder / FMUS["autopilot"]).write_bytes(autopilot_fmu(held, ["host"]))
-    shutil.copy(HERE / OSP, folder)
     for parameters, values in parameter_sets().items():
         # Only connected inputs are connectors, for FMPy sets every one of them at every step.
         components = {
@@ -109,7 +99,5 @@ def build_system(folder: Path) -> None:
             for name, fmu in FMUS.items()
         }
         connections = [Connection(*ends) for ends in CONNECTIONS.items()]
-        system = System("dive", components, STEP, STOP, connections, GROUPS)
-        ssp, osp = system_files(folder, parameters)
-        ssp.write_bytes(ssp_content(system))
-        write_osp(osp, system)
+        system = System("dive", components, STEP, STOP, connections)
+        system_file(folder, parameters).write_bytes(ssp_content(system))

@@ -1,1 +1,1 @@
-"""Systems of FMUs, and connections to ArduPilot, MuJoCo, Gazebo, CasADi, JAX, Gymnasium, MCAP and thruster managers."""
+"""Systems of FMUs, and connections to ArduPilot, MuJoCo, Gazebo, CasADi, JAX, Gymnasium and thruster managers."""

@@ -20,7 +20,6 @@ from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import GRAVITY, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.io.columns import NO_OUTPUT, pulses
-from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.io.numbers import csv_of
 from rov_fmu.io.output import Output, is_same, write_whole
@@ -75,7 +74,7 @@ class Setup:
     bottom: float = inf
     """The depth of the bottom, m."""
     log: Path | None = None
-    """The log to write: a table (CSV) that `identify` reads, or MCAP. Later flights add a number to its name."""
+    """The log to write: a table (CSV) that `identify` reads. Later flights add a number to its name."""
     log_interval: float = 0.1
     """The time between two rows of the log, s."""
     force: bool = False
@@ -85,7 +84,7 @@ class Setup:
 
 
 class FlightLog:
-    """A log of one flight: a table in the form that `identify` reads, or MCAP with the variables of the FMU.
+    """A log of one flight: a table in the form that `identify` reads.
 
     The table has commands, velocities over ground, depth and angles. A row holds the motion at its time, and the mean
     commands up to the next row.
@@ -95,10 +94,7 @@ class FlightLog:
         """Begin a log, whose rows end after the first `most_rows`."""
         layout = setup.vehicle.layout
         self._interval, self._most_rows = setup.log_interval, most_rows
-        self._vehicle = setup.vehicle
         self._motion = [title for title, axis in _LOGGED.items() if layout.has(axis)]
-        if is_mcap(setup.log):
-            self._motion = [*layout.state, *layout.calculated]
         self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
         self._rows = array("d")
         self._number_of_commands = len(layout.commands)
@@ -123,25 +119,10 @@ class FlightLog:
         return len(self._rows) // len(self._titles)
 
     def write(self, path: Path) -> dict[Path, str]:
-        """Write all complete rows, and return what the file replaced.
-
-        Raises WriteError, and InputError where foxglove-sdk is not installed.
-        """
-        if is_mcap(path):
-            return write_whole(Output(path, self._mcap()), force=True)
+        """Write all complete rows, and return what the file replaced. Raises WriteError."""
         width = len(self._titles)
         rows = (self._rows[first : first + width] for first in range(0, len(self._rows), width))
         return write_whole(Output(path, csv_of(self._titles, rows, "{:.9g}".format).encode()), force=True)
-
-    def _mcap(self) -> bytes:
-        """Return all complete rows as the content of an MCAP file."""
-        from rov_fmu.bridges.mcap import motion_mcap  # imports SciPy, which most flights do not need
-
-        layout = self._vehicle.layout
-        time, *columns = np.array(self._rows).reshape(self.rows, len(self._titles)).T
-        values = dict(zip([*layout.commands, *self._motion], columns, strict=True))
-        command_of = np.vectorize(layout.command_of, otypes=[np.float64])
-        return motion_mcap(self._vehicle, time, values | {name: command_of(values[name]) for name in layout.commands})
 
 
 class Outputs:
@@ -212,8 +193,6 @@ class Flight:
         self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
         self._names += [f"der({name})" for name in _RATES if name in layout.state]
         self._names += [_CURRENT] if _CURRENT in layout.electric else []
-        if is_mcap(setup.log):
-            self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self.is_above = False

@@ -26,23 +26,21 @@ class Unit:
     """The unit in which people read its values."""
     factor: float = 1.0
     """Converts values to the display unit."""
-    element: str = "Generic"
-    """The element of OSP-IS for a group of its variables."""
 
 
 _DEGREES = degrees(1.0)
-UNITS = {  # the elements in the order of the schema of OSP-IS
+UNITS = {
     "1": Unit("Number", "command", display="%", factor=100.0),
     "us": Unit("Pulse width", "command", {"s": 1}, size=1e-6),
     "V": Unit("Voltage", exponents={"kg": 1, "m": 2, "s": -3, "A": -1}),
     "A": Unit("Electric current", "electric current", {"A": 1}),
     "W": Unit("Power", "power", {"kg": 1, "m": 2, "s": -3}),
-    "N": Unit("Force", "force", {"kg": 1, "m": 1, "s": -2}, element="Force"),
-    "N.m": Unit("Torque", "torque", element="Torque"),
-    "m/s": Unit("Velocity", "velocity", display="knot", factor=1.0 / (1852.0 / 3600.0), element="LinearVelocity"),
-    "rad/s": Unit("Angular velocity", "rate of turn", {}, 1.0, "deg/s", _DEGREES, "AngularVelocity"),
-    "m": Unit("Length", "position", {"m": 1}, element="LinearDisplacement"),
-    "rad": Unit("Angle", "angle", {"rad": 1}, 1.0, "deg", _DEGREES, "AngularDisplacement"),
+    "N": Unit("Force", "force", {"kg": 1, "m": 1, "s": -2}),
+    "N.m": Unit("Torque", "torque"),
+    "m/s": Unit("Velocity", "velocity", display="knot", factor=1.0 / (1852.0 / 3600.0)),
+    "rad/s": Unit("Angular velocity", "rate of turn", {}, 1.0, "deg/s", _DEGREES),
+    "m": Unit("Length", "position", {"m": 1}),
+    "rad": Unit("Angle", "angle", {"rad": 1}, 1.0, "deg", _DEGREES),
     "m/s2": Unit("Acceleration", "acceleration"),
     "rad/s2": Unit("Angular acceleration", "angular acceleration"),
     "s": Unit("Duration", exponents={"s": 1}),

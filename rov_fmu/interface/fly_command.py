@@ -17,22 +17,20 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 
 
 def write_fly_page(
-    paths: Sequence[Path], recording: Path | None, identified: Path | None, output: Path | None, *, force: bool
+    paths: Sequence[Path], recording: Path | None, output: Path | None, *, force: bool
 ) -> dict[Path, str]:
     """Write the page of one vehicle file, or of two, of which the second is the ghost.
 
     Return its path, with what it replaced.
 
-    `recording` is a log that is flown beside the measurements, and `identified` what `rov-fmu identify --mcap` wrote of
-    it. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
+    `recording` is a log that is flown beside the measurements. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
     """
     vehicles = [load_vehicle(path) for path in paths]
     for words in beyond_stated(vehicles[0]):
         print_message(f"rov-fmu: {words}")
-    given = [path for path in (recording, identified) if path]
-    read = [*paths, *given, *(file for vehicle in vehicles for file in vehicle.files)]
+    read = [*paths, *filter(None, [recording]), *(file for vehicle in vehicles for file in vehicle.files)]
     check_targets([(output, PAGE)], read, force=force)
-    flown = recording_of(recording, vehicles[0], identified) if recording else None
+    flown = recording_of(recording, vehicles[0]) if recording else None
     names = [path.name for path in paths]
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
     shown = [

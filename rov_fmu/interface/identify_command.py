@@ -9,8 +9,8 @@ from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.identify.progress import OnAnswer
 from rov_fmu.identify.result import Identification
 from rov_fmu.interface.arguments import checked_paths
-from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, is_mcap
-from rov_fmu.io.messages import InputError, Progress, silent
+from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE
+from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
@@ -25,7 +25,6 @@ def identify_folder(
     base: str | Path | None = None,
     output: str | Path | None = None,
     report: str | Path | None = None,
-    mcap: str | Path | None = None,
     force: bool = False,
     on_progress: Progress = silent,
 ) -> Identification:
@@ -33,7 +32,7 @@ def identify_folder(
 
     - `tests`: a folder of tank tests or dive logs with its rov.toml, or one log or several of one folder.
     - `base`: the vehicle to begin from, in place of that which rov.toml names: a name or a path.
-    - `output`, `report`, `mcap`: the vehicle file, the report and the MCAP file to write.
+    - `output`, `report`: the vehicle file and the report to write.
     - `force`: True to replace files that rov-fmu did not write, or that have changed since.
     - `on_progress`: called with the name of each step, and the share of its part of the work that is done.
 
@@ -43,7 +42,7 @@ def identify_folder(
     Raises FileError, InputError, WriteError, and BuildError where the filter cannot be compiled.
     """
     paths = checked_paths("tests", tests)
-    given = [None if one is None else Path(one) for one in (output, report, mcap)]
+    given = [None if one is None else Path(one) for one in (output, report)]
     found = find_vehicle(base) if base else None
     return identify_tests(paths, *given, base=found, force=force, begin=lambda _: on_progress)[0]
 
@@ -52,7 +51,6 @@ def identify_tests(
     paths: Sequence[Path],
     vehicle: Path | None,
     report: Path | None,
-    mcap: Path | None = None,
     *,
     base: Path | None = None,
     force: bool,
@@ -62,8 +60,7 @@ def identify_tests(
     """Identify a vehicle from a folder of tank tests, or from logs in one folder, and write the files that are asked
     for.
 
-    These are the vehicle file, the report, and the MCAP file with what was measured and predicted. `base` replaces the
-    vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
+    These are the vehicle file and the report. `base` replaces the vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. `on_answer` is called
@@ -74,9 +71,7 @@ def identify_tests(
     """
     if vehicle and report:
         check_report(vehicle, report)
-    if mcap and not is_mcap(mcap):
-        raise InputError(f"--mcap {mcap}: the name must end with .mcap")
-    targets = [(vehicle, VEHICLE_FILE), (report, PAGE), (mcap, "")]
+    targets = [(vehicle, VEHICLE_FILE), (report, PAGE)]
     check_targets(targets, force=True)  # whose files they are matters once the inputs are known
 
     def check_outputs(inputs: Sequence[Path]) -> None:
@@ -101,8 +96,4 @@ def identify_tests(
 
         page = report_page(identification, begin("drawing the report"))
         outputs.append(Output(report, sealed(page, "identify").encode()))
-    if mcap:
-        from rov_fmu.bridges.mcap_logs import identification_mcap
-
-        outputs.append(Output(mcap, identification_mcap(identification)))
     return identification, write_whole(*outputs, force=force)

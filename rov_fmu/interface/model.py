@@ -17,7 +17,6 @@ from rov_fmu.vehicle.steady import Steady, steady_with
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
 if TYPE_CHECKING:
-    import pandas as pd
     from numpy.typing import ArrayLike
 
     from rov_fmu.autopilot.pilot import Pilot
@@ -140,28 +139,6 @@ class VehicleModel(Vehicle):
         return simulated_result(
             self, time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes
         )
-
-    def to_mcap(self, result: "Result | pd.DataFrame") -> bytes:
-        """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.
-
-        `Path("run.mcap").write_bytes(vehicle.to_mcap(result))`. The file has the pose and the jets of the vehicle, as
-        far as their variables were recorded, and all recorded inputs and outputs by name (rov_fmu/bridges/mcap.py).
-        A data frame has the trajectories of one run of a study: `vehicle.to_mcap(results.trajectories([7]))`.
-
-        Raises InputError if the result is that of many vehicles or runs, or of none, or where foxglove-sdk is not
-        installed.
-        """
-        from rov_fmu.bridges.mcap import motion_mcap
-        from rov_fmu.interface.result import Result
-
-        if not isinstance(result, Result):
-            if result["run"].nunique() != 1:
-                raise InputError("result: must have the kept outputs of one run of a study")
-            columns = {str(name): column.to_numpy(float) for name, column in result.items()}
-            return motion_mcap(self, columns["t"], columns)
-        if any(values.ndim != 1 for values in result.values()):
-            raise InputError("result: must be the simulation of one vehicle")
-        return motion_mcap(self, result.time, result)
 
     @property
     def force_names(self) -> tuple[str, ...]:
@@ -383,7 +360,6 @@ class VehicleModel(Vehicle):
         backend: str = "native",
         fmi: int = 2,
         interface: str | None = None,
-        osp: bool = False,
         sign: Path | None = None,
         force: bool = False,
     ) -> "Built":
@@ -402,7 +378,6 @@ class VehicleModel(Vehicle):
             backend=backend,
             fmi=fmi,
             interface=interface,
-            osp=osp,
             sign=sign,
             force=force,
         )

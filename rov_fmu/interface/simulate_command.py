@@ -13,7 +13,6 @@ from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.interface.arguments import STEP, TIME, name_at_start, result_times
 from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
-from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, print_message, shown, wrapped
 from rov_fmu.io.numbers import csv_of
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
@@ -26,7 +25,7 @@ _STOP = 10.0
 _SHORTEST = 1e-6
 """The shortest simulation, s."""
 _MOST_RESULTS = 1_000_000
-_TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet", ".mcap"), (".png", ".svg", ".pdf")
+_TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet"), (".png", ".svg", ".pdf")
 
 
 def simulate_vehicle(
@@ -50,14 +49,13 @@ def simulate_vehicle(
     """
     opens, vehicle = plot == Path(), load(path)
     check_outputs(output, None if opens else plot, [path, *vehicle.files, *filter(None, [commands])], force=force)
-    result = simulation_of(vehicle, settings, commands, stop, step, records_inputs=is_mcap(output))
+    result = simulation_of(vehicle, settings, commands, stop, step)
     if vehicle.layout.has_only_water and "z" in result and (above := result["z"] < -AFLOAT).any():
         print_message(f"rov-fmu: {LEFT_WATER.format(f'{result.time[above.argmax()]:g}')}")
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     outputs = []
     if output:
-        is_table = not is_mcap(output)
-        outputs.append(_table_output(result, output) if is_table else Output(output, vehicle.to_mcap(result)))
+        outputs.append(_table_output(result, output))
     if picture:
         outputs.append(_plot_output(result, picture, title(vehicle, settings, commands)))
     written = write_whole(*outputs, force=force)
@@ -138,13 +136,8 @@ def simulation_of(
     commands: Path | None,
     stop: float | None,
     step: float | None,
-    *,
-    records_inputs: bool,
 ) -> Result:
-    """Simulate a vehicle as the options say, and record the inputs, too, if that is asked for.
-
-    Raises InputError, FileError, BuildError.
-    """
+    """Simulate a vehicle as the options say. Raises InputError, FileError, BuildError."""
     inputs: dict[str, Any] = {}
     if commands:
         from rov_fmu.interface.command_files import read_inputs  # imported here because readers of logs are slow
@@ -166,10 +159,8 @@ def simulation_of(
     stop, step = _STOP if stop is None else stop, STEP if step is None else step
     if stop / step > _MOST_RESULTS:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
-    layout = vehicle.layout
-    record = [*layout.inputs, *layout.state, *layout.calculated] if records_inputs else None
     changed = vehicle.with_(**given.coefficients)
-    return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start, record=record)
+    return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start)
 
 
 def _least_step(stop: float) -> float:

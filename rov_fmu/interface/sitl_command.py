@@ -17,7 +17,6 @@ from rov_fmu.equation.parts import FAINT
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
-from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
@@ -64,7 +63,7 @@ def serve(path: Path, *, host: str, port: int, duration: float | None, **flight:
             paragraph(console(), _summary(connection))
             if connection.logs:
                 inspect = shell_words("rov-fmu", "inspect", next(iter(connection.logs)))
-                print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(setup.log) else inspect)
+                print_end(connection.logs, inspect)
             elif setup.log:
                 paragraph(console(), "No log was written, because no row was complete.")
 
@@ -91,8 +90,8 @@ def _setup(
 
     Raises FileError, InputError, WriteError.
     """
-    if log and log.suffix.lower() not in (".csv", ".mcap"):
-        raise InputError(f"--log {log}: the name must end with .csv or .mcap")
+    if log and log.suffix.lower() != ".csv":
+        raise InputError(f"--log {log}: the name must end with .csv")
     if frame is not None and frame not in FRAMES:
         hint = did_you_mean(frame, FRAMES)
         raise InputError(f"--frame {shown(frame)}: must be one of {', '.join(FRAMES)}{hint}")

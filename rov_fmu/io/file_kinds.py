@@ -107,8 +107,3 @@ def _message(path: Path, wanted: str, kind: str) -> str:
     """Return the line about a file of the wrong kind, with what to do with such a file."""
     hint = f"; {_HINTS[kind]}" if kind in _HINTS else ""
     return f"{path}: must be {wanted}, and not {kind}{hint}"
-
-
-def is_mcap(path: Path | None) -> bool:
-    """Return True if the name of a file says that it is MCAP."""
-    return path is not None and path.suffix.lower() == ".mcap"

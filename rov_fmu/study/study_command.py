@@ -1,18 +1,17 @@
-"""The command `rov-fmu study`: the study with its progress, the page, and a run for Foxglove."""
+"""The command `rov-fmu study`: the study with its progress and the page."""
 
 import logging
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rov_fmu.io.messages import FileError, StudyError
+from rov_fmu.io.messages import StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table, text
 from rov_fmu.report.progress import StudyParts, parts, per_second
-from rov_fmu.study.plan.plan import REASON, PlanError, load_plan
+from rov_fmu.study.plan.plan import REASON, load_plan
 from rov_fmu.study.results.store import PAGE, STUDY, is_description
 from rov_fmu.study.run.run_study import do_study
-from rov_fmu.vehicle.shipped import named_in
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
@@ -27,25 +26,20 @@ def study_plan(
     plan: Path,
     output: Path,
     *,
-    run: int | None,
     part: str | None,
     force: bool,
     **how: Any,
 ) -> None:
-    """Do the missing runs of a study, and write and print what came of it. `run` is written for Foxglove, too.
+    """Do the missing runs of a study, and write and print what came of it.
 
     A part has no page. Raises StudyError if no run is complete, and what `study` raises.
     """
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
-    motion = output / f"run-{run}.mcap"
-    targets = [(path, "") for path in (output / PAGE, output / STUDY, motion if run is not None else None)]
+    targets = [(path, "") for path in (output / PAGE, output / STUDY)]
     check = partial(check_targets, targets if output.is_dir() else (), force=force, is_ours=is_description)
     check([plan])
     read = load_plan(plan)
     check([plan, *(plan.parent / name for name in read.files)])
-    vehicle = read.vehicle
-    if run is not None and not vehicle:
-        raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
     with parts() as shown:
         work = do_study(
             plan,
@@ -60,18 +54,12 @@ def study_plan(
         words = f"part {part.replace('/', ' of ')} is complete: {work.runs} runs now, {work.failed} failed"
         paragraph(console(), f"{shell_words(output)}: {words}")
         return
-    from rov_fmu.interface.model import load
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.results import Results
 
     results = Results(output)
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, work.runs, work.elapsed)
-    if vehicle and run is not None:
-        if not results.outputs or (moved := results.trajectories([run])).empty:
-            raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
-        content = load(named_in(plan, "vehicle", vehicle, PlanError)).to_mcap(moved)
-        files |= write_whole(Output(motion, content), force=force)
     print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")

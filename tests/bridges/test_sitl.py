@@ -21,7 +21,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-import rov_fmu
 from rov_fmu.bridges.sitl import MOST_LOGS, Outputs, Setup, SitlConnection
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
@@ -31,7 +30,6 @@ from rov_fmu.tank.readers.ardusub_frames import FRAMES, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import START, ArduSub, packet, parsed, started
-from tests.bridges.test_mcap import messages
 from tests.commands import ROOT, Capsys
 from tests.tank.logs import commanded, used
 from tests.vehicles import numbered, pulsed, thruster
@@ -423,24 +421,6 @@ def test_no_log_replaces_a_table_of_the_vehicle(tmp_path: Path) -> None:
     assert connection.logs == {tmp_path / "dive.csv": "", old: foreign}
 
 
-def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_variables(tmp_path: Path) -> None:
-    rov = rov_fmu.load("videoray")
-    setup = Setup(rov, servos_of(rov.layout, None, {1: "l", 2: "-r"}), {"u_t": 0.2}, log=tmp_path / "dive.mcap")
-    connection = SitlConnection(setup)
-    for count in range(101):
-        connection.answer(packet(100, count, [2100, 1400, *[1900] * 14]), HERE)
-    connection.write_log()
-    ((path, replaced),) = connection.logs.items()
-    assert (path, replaced) == (tmp_path / "dive.mcap", "")
-    found = messages(path.read_bytes())
-    commands = {"u_l": 1.0, "u_r": 0.25, "u_t": 0.2}
-    assert found["/inputs"] == [(10_000_000, pytest.approx(commands))]
-    assert [stamp for stamp, _ in found["/outputs"]] == [10_000_000 + 100_000_000 * n for n in range(10)]
-    expected = rov.simulate([0.0, *(stamp * 1e-9 for stamp, _ in found["/outputs"])], commands)
-    for name, values in expected.items():
-        assert [row[name] for _, row in found["/outputs"]] == pytest.approx(values[1:], rel=1e-9, abs=1e-12)
-
-
 def test_the_pulses_of_the_vehicle_file_count() -> None:
     rov = load_vehicle(SHIPPED["videoray"])
     usual = SitlConnection(setup_of(rov)).answer(packet(400, 0, [1700, 1900, *[1500] * 14]), HERE)
@@ -539,7 +519,7 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(tmp_path
         ("videoray --servo 1=t --servo 1=l", "--servo 1=l: servo 1 is given before"),
         ("videoray --set u_l=0.5", "--set u_l: servo 2 drives this input"),
         ("videoray --set V_X=0.5", "--set V_X=0.5: the vehicle has no such"),
-        ("videoray --log a.txt", "--log a.txt: the name must end with .csv or .mcap"),
+        ("videoray --log a.txt", "--log a.txt: the name must end with .csv"),
         ("videoray --host 192.0.2.1", "--host 192.0.2.1, --port 9002: cannot listen there"),
         (quote(f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}"), "VEHICLE: none of ArduSub's frames"),
     ],

@@ -121,7 +121,7 @@ _QUICK = (("tune", "output"),)
 
 @pytest.mark.parametrize(
     "key",
-    spread([key for key in COMMANDS if key[0] != "sitl"], _QUICK, [("build", "osp"), ("identify", "report")]),
+    spread([key for key in COMMANDS if key[0] != "sitl"], _QUICK, [("identify", "report")]),
     ids=" ".join,
 )
 def test_an_interrupt_before_the_last_move_leaves_nothing(key: tuple[str, str], tmp_path: Path) -> None:

@@ -79,18 +79,12 @@ TYPED: dict[str, tuple[str, str]] = {
         "prove videoray",
         "videoray: must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name",
     ),
-    "errors without their recording": (
-        "fly --identified a.mcap",
-        "fly: --identified needs --recording, the log that it is about",
-    ),
     "workers of a scheduler": (
         "study plan.toml -o r --workers 1 --scheduler tcp://a:1",
         "study: leave --workers out, because the scheduler already has its workers",
     ),
-    "a run without a vehicle": ("study fmu.toml -o r --mcap 0", "fmu.toml: --mcap 0: the plan must have `vehicle`, "),
     "a command alone": ("tune videoray --axis heave --command 1", "tune: give --command and --v-ss (and --tau), or "),
     "Python and FMI 3.0": ("build --fmi 3 --backend=pythonfmu", "--fmi 3: PythonFMU makes FMI 2.0 alone"),
-    "OSP and FMI 3.0": ("build --fmi 3 --osp", "--fmi 3: libcosim and the OSP tools, "),
     "no name for the file": ("build -o ''", ".: cannot be written: is a folder"),
 }
 _PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "max(u)"\n'
@@ -126,7 +120,6 @@ LIMITS = {
     "sitl videoray --port": ("0", "-1", "65535", "65536"),
     "prove x.fmu --tolerance": ("5e-324", "0", "1e300", "inf"),
     "study plan.toml -o r --workers": ("1", "0", "1024", "1025"),
-    "study plan.toml -o r --mcap": ("0", "-1", "1000000000", "1000000001"),
 }
 """For each option, the least value and one below it, the largest value and one above it."""
 

@@ -86,11 +86,11 @@ _WORK = (
     "rov_fmu.build.compile_all",
 )
 _SLOW = ("build", "study", "identify", "inspect", "prove")
-_OFTEN = (("build", "osp"), ("study", "output"), ("identify", "output"))
+_OFTEN = (("study", "output"), ("identify", "output"))
 
 
 def test_every_file_that_a_command_reads_or_writes_is_known_here() -> None:
-    assert WRITING.keys() - {("build", "osp"), ("export", "folder"), ("study", "run")} == FILES.keys() - READING.keys()
+    assert WRITING.keys() - {("export", "folder")} == FILES.keys() - READING.keys()
     assert {name for name, command in _commands.commands.items() for p in command.params if p.name == "force"} == {
         name for name, _ in WRITING
     }

@@ -180,7 +180,7 @@ WRONG = {
         "late.csv, up to 1e+09 s, needs a longer --step than 0.01 s: at least 1000 s\n",
     ),
     "a time that goes back": ("--input back.csv", "back.csv, line 5: the time goes back\n"),
-    "another table": ("-o result.txt", "--output result.txt: the name must end with .csv, .parquet or .mcap"),
+    "another table": ("-o result.txt", "--output result.txt: the name must end with .csv or .parquet"),
     "a plot before the vehicle": ("--plot videoray", ".png, .svg or .pdf; put --plot without a file after VEH"),
     "a load with a unit": (
         "--input load.csv",

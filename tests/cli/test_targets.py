@@ -141,7 +141,7 @@ def test_what_is_read_only_stays(file_mode: int, folder_mode: int, reason: str, 
 
 @pytest.mark.parametrize(
     ("command", "options"),
-    [("build", ("output", "osp")), pytest.param("identify", ("output", "report"), marks=pytest.mark.long)],
+    [pytest.param("identify", ("output", "report"), marks=pytest.mark.long)],
 )
 def test_two_files_are_written_both_or_neither(
     command: str, options: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
@@ -177,13 +177,11 @@ BUILT = [
     ("linked.toml", "videoray.toml"),
     ("videoray.toml", "hard.toml"),
     ("refit.toml", "report.html"),
-    ("videoray_OspModelDescription.xml", "x"),
-    ("videoray", "videoray_OspModelDescription.xml"),
     ("videoray.toml", "tables/table3_heave_steady.csv"),
     ("effects.toml", "thrust_16_v.csv"),
 ]
 OVERWRITING = [
-    *(f"build {vehicle} --osp -o {output}" for vehicle, output in BUILT),
+    *(f"build {vehicle} -o {output}" for vehicle, output in BUILT),
     "identify tests --force -o tests/rov.toml",
     "identify tests --force -o tests/other.toml",
     "tune videoray.toml --axis heave --points points.csv -o points.csv",
@@ -207,8 +205,7 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(VIDEORAY.parent, folder, dirs_exist_ok=True)
     shutil.copytree(TESTS, folder / "tests")
     write_vehicle(load_vehicle(VIDEORAY), folder / "tests" / "other.toml")
-    for path, name in [(THRUST_EFFECTS, "effects.toml"), (VIDEORAY, "videoray_OspModelDescription.xml")]:
-        shutil.copy(path, folder / name)
+    shutil.copy(THRUST_EFFECTS, folder / "effects.toml")
     for path in load_vehicle(THRUST_EFFECTS).files:
         shutil.copy(path, folder)
     (folder / "linked.toml").symlink_to("videoray.toml")
@@ -220,7 +217,7 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "report.html": "a report",
         "points.csv": "time,command [%],velocity [m/s]\n0,20,0.1\n",
         "study.json": 'vehicle = "videoray.toml"\nstop_time = 1.0\n',
-        **dict.fromkeys(("logs.mcap", "videoray.fmu", "key.pub"), "is read once the output is checked"),
+        **dict.fromkeys(("videoray.fmu", "key.pub"), "is read once the output is checked"),
     }
     make_key(folder / "key.fmu")
     for name, text in texts.items():

@@ -107,7 +107,7 @@ COMMANDS = [
     "list",
     f"{_TUNE} -o tuned.toml",
     "build videorey",
-    "build bare.toml --platform host --osp",
+    "build bare.toml --platform host",
     "build --platform amiga",
     "simulate bare.toml --set u_t=1.5",
     "simulate bare.toml --set u_x=1",

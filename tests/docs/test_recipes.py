@@ -126,7 +126,6 @@ from pathlib import Path
 from rov_fmu.bridges import allocation, arrays, mujoco, sdf, urdf
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.fmu.content import native_content
-from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.report.page.equations import equations_of
@@ -165,7 +164,6 @@ found = {
     "urdf": urdf.urdf_model(rov).notes,
     "allocation": allocation.allocation_files(rov)["allocation.yaml"],
     "mujoco": files["README.md"],
-    "osp": osp_model_description(rov.layout).decode(),
     "terminals": {one.name: one.variables for one in terminals(rov.layout)},
     "read": [*entries],
     "suffixes": LOG_SUFFIXES,
@@ -232,7 +230,6 @@ def test_an_output_with_a_new_unit_is_in_every_list(found: dict[str, Any]) -> No
     assert found["pressure"] == 10.0 * abs(found["F_t"])
     assert '<BaseUnit kg="1" m="-1" s="-2"/>' in found["description"]
     assert 'name="pressure"' in found["description"]
-    assert 'ref="pressure"' in found["osp"]
     assert found["terminals"]["other_outputs"] == ["pressure"]
 
 

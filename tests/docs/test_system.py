@@ -20,7 +20,7 @@ from examples.system.system import (
     FMUS,
     build_system,
     parameter_sets,
-    system_files,
+    system_file,
 )
 from examples.system.with_fmpy import fly
 from examples.tether import draw
@@ -102,7 +102,7 @@ def test_the_order_of_stepping_makes_a_difference(expected: tuple[str, Trajector
 
 @pytest.mark.parametrize("parameters", SETS)
 def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None:
-    path = system_files(folder, parameters)[0]
+    path = system_file(folder, parameters)
     system = read_ssd(str(path)).system  # checked against the schemas of SSP 1.0
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}

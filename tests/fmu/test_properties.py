@@ -13,12 +13,8 @@ from fmpy.validation import validate_model_description
 from lxml import etree
 
 from rov_fmu.c import compile as build_options
-from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
-from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Vector
-from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.model_description import build_description, model_description, model_of
-from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -179,7 +175,7 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
     assert not {*types} & {v.get("name") for v in variables_of}, "the names of types and variables differ"
 
 
-# ---- Terminals, and the groups of OSP-IS 1.0.1 ----
+# ---- Terminals ----
 
 
 def terminals_of(document: bytes) -> dict[str, etree._Element]:
@@ -235,100 +231,6 @@ def test_every_velocity_says_of_what_it_is_and_those_over_ground_are_outputs(kin
         assert re.search("current" if v.causality == "input" else "(over ground|through the water)", v.description)
         is_over_ground = v.name.startswith("vg_") or v.name in {f"der({x})" for x in position}
         assert ("over ground" in v.description) == is_over_ground
-
-
-NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
-
-# The elements for motion in the sequence of the schema, with the dimension of their variables.
-SEQUENCE = {
-    "Generic": {},
-    "Force": {"kg": 1, "m": 1, "s": -2},
-    "Torque": {"kg": 1, "m": 2, "s": -2},
-    "LinearVelocity": {"m": 1, "s": -1},
-    "AngularVelocity": {"rad": 1, "s": -1},
-    "LinearDisplacement": {"m": 1},
-    "AngularDisplacement": {"rad": 1},
-}
-
-
-LETTERS = {
-    name: letter
-    for letter, names in {
-        "x": "u p x vg_N phi X_ext K_ext V_N",
-        "y": "v q y vg_E theta Y_ext M_ext V_E",
-        "z": "w r z vg_D psi Z_ext N_ext V_D",
-    }.items()
-    for name in names.split()
-}
-"""The axis along or about which each variable acts, in the body frame or in NED; torques of curves act about z."""
-
-
-def groups_of(layout: Layout) -> list[etree._Element]:
-    root = etree.fromstring(osp_model_description(layout))
-    assert root.tag == f"{NAMESPACE}OspModelDescription"
-    assert dict(root.attrib) == {"version": "1.0"}
-    (parent,) = root
-    assert parent.tag == f"{NAMESPACE}VariableGroups"
-    return list(parent)
-
-
-def test_a_point_is_a_port_of_force_and_velocity_over_ground() -> None:
-    """Its force goes in and its velocity comes out, as OSP-IS has it, after all groups of one unit."""
-    groups = {group.get("name"): group for group in groups_of(ROVS["tied, VideoRay"].layout)}
-    for point in _POINTS:
-        port = groups[f"point_{point}"]
-        assert port.tag == f"{NAMESPACE}LinearMechanicalPort"
-        force, velocity = ([(v.get("ref"), v.get("unit"), v.get("axis")) for v in part] for part in port)
-        assert [part.tag.removeprefix(NAMESPACE) for part in port] == ["Force", "LinearVelocity"]
-        assert force == [(f"F_{d}_{point}", "N", axis) for d, axis in zip("NED", "xyz", strict=True)]
-        assert velocity == [(f"vg_{d}_{point}", "m/s", axis) for d, axis in zip("NED", "xyz", strict=True)]
-    assert [*groups][-len(_POINTS) :] == [f"point_{point}" for point in _POINTS]
-
-
-def references(group: etree._Element) -> list[str]:
-    assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
-    return [variable.get("ref") for variable in group]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_input_and_output_is_in_one_group(kind: str) -> None:
-    """The variables of a group have the same causality and unit, and different axes."""
-    rov = ROVS[kind]
-    every = groups_of(rov.layout)
-    groups = [group for group in every if not group.tag.endswith("Port")]
-    groups += [part for group in every if group.tag.endswith("Port") for part in group]
-    declared = {v.name: v for v in variables(rov)}
-    grouped = sorted(name for group in groups for name in references(group))
-    assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
-    names = [group.get("name") for group in every]
-    assert all(names)
-    assert len(set(names)) == len(names)
-    for group in groups:
-        members = [declared[name] for name in references(group)]
-        assert 1 <= len(members) <= 3
-        assert len({v.causality for v in members}) == 1
-        assert [v.unit for v in members] == [variable.get("unit") for variable in group]
-        (unit,) = {v.unit for v in members}
-        of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == parsed_unit(unit).exponents] or [
-            "Generic"
-        ]
-        assert of_unit == [group.tag.removeprefix(NAMESPACE)]
-    order = [[*SEQUENCE, "LinearMechanicalPort"].index(group.tag.removeprefix(NAMESPACE)) for group in every]
-    assert order == sorted(order)
-    axes = {variable.get("ref"): variable.get("axis") for group in groups for variable in group}
-    directions = {f"F_{one.name}": map(one.effect, (SURGE, SWAY, HEAVE)) for one in rov.layout.thrusters}
-    along = {
-        name: next((letter for letter, x in zip("xyz", parts, strict=True) if abs(x) > 0.999), None)
-        for name, parts in directions.items()
-    }
-    about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
-    of_points = {
-        name.format(x, point): axis
-        for point in (point.name for point in rov.layout.points)
-        for name, letters in (("F_{}_{}", "NED"), ("{}_{}", "xyz"), ("vg_{}_{}", "NED"))
-        for x, axis in zip(letters, "xyz", strict=True)
-    }
-    assert axes == {name: (LETTERS | along | about | of_points).get(name) for name in axes}
 
 
 # ---- Dependencies, against slopes of the equations of the reference ----

@@ -95,7 +95,6 @@ def test_an_interface_that_an_fmu_cannot_have_is_refused(
     monkeypatch.chdir(tmp_path)
     for options, line in (
         (["--backend", "pythonfmu", "--interface", "me"], "--interface me: PythonFMU makes Co-Simulation (cs) alone"),
-        (["--osp", "--interface", "me"], "--interface me: libcosim and the OSP tools, which --osp is for, run"),
         (["--interface", "model-exchange"], "must be one of cs, me, both; did you mean me?"),
     ):
         assert main(["build", str(BARE), *options]) == 2

@@ -21,7 +21,6 @@ from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
-from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.result import Identification
 from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
@@ -63,10 +62,10 @@ _VARIES = re.compile(
 
 
 def _described(vehicle: Vehicle, fmi: int) -> str:
-    """Return what an FMU says of its vehicle: model description with the model card, terminals, and groups of OSP."""
+    """Return what an FMU says of its vehicle: model description with the model card, and terminals."""
     files = native_content(vehicle, fmi=fmi).files
     parts = [files["modelDescription.xml"], files["terminalsAndIcons/terminalsAndIcons.xml"]]
-    text = b"\n".join([*parts, osp_model_description(vehicle.layout)]).decode()
+    text = b"\n".join(parts).decode()
     return text.replace("&#10;", "\n")
 
 

@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 
 import rov_fmu
-from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.build import build_fmu
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
@@ -251,14 +250,6 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: v.stepper(start={"u": 1e200}).step({}, 2.0),
         r"the motion cannot be computed from 0 s on: it overflows, .* and needs shorter steps than 2 s$",
     ),
-    "many in one file": (
-        lambda v: v.to_mcap(v.simulate_many(TIMES, coefficients={"a_d_u": [1, 2]})),
-        "result: must be the simulation of one vehicle$",
-    ),
-    "two runs in one file": (
-        lambda v: v.to_mcap(pd.DataFrame({"run": [0, 1], "t": [0, 0]})),
-        "result: must have the kept outputs of one run of a study$",
-    ),
     "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
     "unknown input": (
         lambda v: v.simulate(TIMES, {"ul": 1}),
@@ -294,10 +285,6 @@ WRONG: dict[str, tuple[Call, str]] = {
         "a_d_u: has values for 3 vehicles, but u_l has values for 2",
     ),
     "response of an unknown axis": (lambda v: v.response("sway", 0.3), "axis = 'sway': .* only surge, heave, yaw"),
-    "derivatives of a step with missing inputs": (
-        lambda v: step_jacobian(v, {"u_l": 0.3}, v.layout.at_rest, 1.0),
-        "inputs: u_r, u_t, X_ext, .* must be given, too",
-    ),
     "no workers": (lambda v: v.simulate_many(TIMES, workers=0), "workers = 0: must be a whole number from 1 to 1024"),
     "per vehicle and not per time": (
         lambda v: v.simulate_many(TIMES, {"u_l": np.full(1000, 0.1)}),

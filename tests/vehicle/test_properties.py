@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
-from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -70,7 +69,6 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     """Return what FMPy reads and validates from an FMU without binaries."""
     fmu = folder / "only.fmu"
     fmu.write_bytes(archive(native_content(vehicle).files))
-    osp_model_description(vehicle.layout)
     return read_model_description(str(fmu), validate=True)
 
 

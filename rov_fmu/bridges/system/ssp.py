@@ -1,4 +1,4 @@
-"""Write a system of FMUs for co-simulation tools, as SSP 1.0 or as an OSP configuration, and read it from SSP."""
+"""Write a system of FMUs for co-simulation tools, as SSP 1.0, and read it from SSP."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -55,14 +55,6 @@ class System:
     step: float
     stop: float
     connections: Sequence[Connection] = ()
-    groups: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """The connections for OSP between variable groups, which stand for all from one component to another."""
-
-    @property
-    def single_connections(self) -> list[Connection]:
-        """The connections that no group stands for."""
-        grouped = {*self.groups.values()}
-        return [one for one in self.connections if (one.start[0], one.end[0]) not in grouped]
 
 
 # ---- Writing ---------------------------------------------------------------------------------------------------------
@@ -97,11 +89,6 @@ def _comment(packed: bytes) -> bytes:
 def parameter_set(component: Component) -> str:
     """Return the parameter set (SSV) of a component."""
     return _rendered("ParameterSet.ssv.j2", component=component)
-
-
-def write_osp(path: Path, system: System) -> None:
-    """Write the OSP configuration. The FMUs and their OSP model descriptions are in the same folder."""
-    path.write_text(_rendered("OspSystemStructure.xml.j2", system=system), encoding="utf-8")
 
 
 def _rendered(template: str, **content: Component | System) -> str:

@@ -395,7 +395,7 @@ def unconnected(plan: SystemPlan, structure: SystemStructure) -> Iterator[str]:
 
 
 def files_of(plan: SystemPlan, structure: SystemStructure, name: str) -> System:
-    """Return the system as the writers of SSP and OSP take it.
+    """Return the system as the writer of SSP takes it.
 
     Only inputs that are connected are connectors, because FMPy sets every one of them at every step.
     """

@@ -1,12 +1,11 @@
-"""A log as the page that flies reads it: the commands of the vehicle, what was measured, and what identification adds.
+"""A log as the page that flies reads it: the commands of the vehicle, what was measured.
 
 Any format that `rov-fmu identify` reads is converted, with the tables [columns], [topics], [dives] and [logs] of the
 rov.toml beside the file. Of a dive of several files, all are read, whichever is named. Nothing is resampled: commands
 and measurements keep their own times.
 """
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,30 +15,23 @@ from rov_fmu.equation.catalogue import EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.reading import open_file
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
-from rov_fmu.tank.readers.parsers import one_parser, read_topics
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _MOST_SAMPLES = 20_000
 """The largest number of samples of a quantity. Of more samples, every second, third … is flown."""
 
 
-def topic_name(text: str) -> str:
-    """Return a text, such as the name of a file, as a part of a topic, for which viewers need no quotation marks."""
-    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
-
-
 @one_parser()
-def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -> dict[str, Any]:
+def recording_of(path: Path, vehicle: Vehicle) -> dict[str, Any]:
     """Return the recording in a log, as fmu_src/live/recording.js declares it.
 
-    `identified` is the MCAP file that `rov-fmu identify --mcap` wrote: the bands of its predictions and its unknown
-    forces are added. Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
+    Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
     """
     rov_file, layout = description_beside(path), vehicle.layout
     if rov_file.tables.has_wrench:
@@ -52,15 +44,13 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     if not signals:
         names = ", ".join(vehicle.layout.by_name)
         raise DataFileError(f"{path}: no motion of an axis of this vehicle was found: {names}")
-    begin = min([start, *(float(c.samples[0][0]) for c in log.channels if not c.unused and c.count)])
-    forces = [*_add_identified(identified, log, vehicle.layout, signals, begin - start)] if identified else []
     times, commands = _commands(log, vehicle.layout)
     return {
         "name": path.name,
         "times": _rounded(times - start),
         "commands": commands,
         "signals": signals,
-        "forces": forces,
+        "forces": [],
         "notes": [],
         "left": 0,
     }
@@ -106,38 +96,6 @@ def _signals(log: Log, axes: tuple[VehicleAxis, ...], start: float, end: float) 
                 "values": _rounded(values[is_meant][::stride]),
             }
             break
-
-
-def _add_identified(
-    path: Path, log: Log, layout: Layout, signals: list[dict[str, Any]], begin: float
-) -> Iterator[dict[str, Any]]:
-    """Add the bands of predictions to the signals, and yield the unknown forces. The file's times begin at `begin`.
-
-    Raises DataFileError if the file has nothing about this log.
-    """
-    with open_file(path):
-        pass
-    own = f"/{topic_name(log.file)}/"
-    known = [topic_name(signal["quantity"]) for signal in signals]
-    known += [f"unknown_force/{form.axis.name}" for form in layout.axes]
-    content = read_topics(path, {own + name for name in known})
-    topics = {topic.source.topic.removeprefix(own): topic for piece in content.pieces for topic in piece.topics}
-    if not topics:
-        raise DataFileError(f"{path}: has nothing about {log.file}; `rov-fmu identify --mcap` writes such a file")
-
-    def band(fields: Mapping[str, Array], times: Array) -> dict[str, list[float]]:
-        half = 0.5 * (fields["high"] - fields["low"])
-        there = np.isfinite(half)  # what was measured may begin before what is predicted
-        return {"times": _rounded(times[there] + begin), "values": _rounded(half[there])}
-
-    for signal in signals:
-        topic = topics.get(topic_name(signal["quantity"]))
-        if topic and "low" in topic.fields:
-            signal["band"] = band(topic.fields, topic.time)
-    for n, axis in enumerate(layout.bare_axes):
-        if topic := topics.get(f"unknown_force/{axis.name}"):
-            values = {"times": _rounded(topic.time + begin), "values": _rounded(topic.fields["force"])}
-            yield {"axis": n, **values, "band": band(topic.fields, topic.time)}
 
 
 def _rounded(values: Array) -> list[float]:

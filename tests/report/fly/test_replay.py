@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from lxml import html
 
-from rov_fmu.bridges import mcap
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import Declaration
 from rov_fmu.report.page.live import FlyingVehicle, fly_page
-from rov_fmu.report.page.recording import recording_of, topic_name
+from rov_fmu.report.page.recording import recording_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.conftest import Visit, chart, flown_vehicle, until
@@ -64,7 +62,6 @@ ERRORS = "live.flight.replay.errors.map((list) => Math.max(...list.map(Math.abs)
         ("time [s],depth [m]\n0,1\n1,2\n", ["--recording", "dive.csv"], "there is no column of commands"),
         ("time [s],u_l [%]\n0,1\n1,2\n", ["--recording", "dive.csv"], "is missing"),
         ("time [s],u_l [%],depth [m]\n0,9,\n1,9,\n2,9,\n", ["--recording", "dive.csv"], "no motion of an axis of this"),
-        ("", ["--identified", "logs.mcap"], "--recording"),
     ],
 )
 def test_a_log_that_cannot_be_flown_is_refused_in_one_line(
@@ -144,28 +141,12 @@ def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, r
     assert "The prediction is off by" in page.inner_text("#live-message")
 
 
-@pytest.fixture
-def identified(csv: Path, tmp_path: Path) -> Path:
-    """What `identify --mcap` writes: a band of the depth from 5 s on, and the unknown force of heave."""
-    number = Declaration("m", "a number")
-    written = mcap.Recording({"name": "VideoRay"})
-    name = topic_name(csv.name)
-    depth = written.topic(f"/{name}/depth", dict.fromkeys(("measured", "predicted", "low", "high"), number))
-    force = written.topic(f"/{name}/unknown_force/heave", dict.fromkeys(("force", "low", "high"), number))
-    for n in range(200):
-        band = {"predicted": 1.0, "low": 1.0 - 0.01 * n, "high": 1.0 + 0.01 * n} if n >= 50 else {}
-        depth(n * 100_000_000, {"measured": 0.0} | band)
-        force(n * 100_000_000, {"force": 0.02 * n, "low": 0.02 * n - 0.5, "high": 0.02 * n + 0.5})
-    (tmp_path / "logs.mcap").write_bytes(written.content())
-    return tmp_path / "logs.mcap"
-
-
-def test_a_recording_has_commands_measurements_bands_and_the_unknown_force(
-    csv: Path, identified: Path, vehicle: Vehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_recording_has_commands_and_measurements(
+    csv: Path, vehicle: Vehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of 200 samples of a quantity, every second is flown where more than 100 are too many."""
     monkeypatch.setattr("rov_fmu.report.page.recording._MOST_SAMPLES", 100)
-    found = recording_of(csv, vehicle, identified)
+    found = recording_of(csv, vehicle)
     columns = np.loadtxt(csv, delimiter=",", skiprows=1).T
     _, depth, heading = found["signals"]
     assert [(one["axis"], one["quantity"], one["isPosition"]) for one in found["signals"]] == [
@@ -176,12 +157,6 @@ def test_a_recording_has_commands_measurements_bands_and_the_unknown_force(
     assert np.sin(heading["values"]) == pytest.approx(np.sin(np.radians(columns[6][::2])), abs=1e-8)
     held = np.searchsorted(found["times"], 10.0, side="right") - 1
     assert found["commands"]["u_t"][held] == pytest.approx(0.01 * columns[3][100])
-    assert depth["band"]["times"] == pytest.approx(0.1 * np.arange(50, 200))
-    assert depth["band"]["values"] == pytest.approx(0.01 * np.arange(50, 200))
-    (force,) = found["forces"]
-    assert (force["axis"], force["band"]["values"]) == (1, pytest.approx([0.5] * 200))
-    assert force["values"] == pytest.approx(0.02 * np.arange(200))
-    assert force["times"] == force["band"]["times"] == pytest.approx(0.1 * np.arange(200))
     (tmp_path / "log_heave.csv").write_text("time [s],command [%],z [m]\n0,30,0\n1,-50,1\n2,-50,2\n", encoding="utf-8")
     commands = recording_of(tmp_path / "log_heave.csv", vehicle)["commands"]
     assert [commands[name][:2] for name in ("u_l", "u_r", "u_t")] == [[0.0, 0.0], [0.0, 0.0], [0.3, -0.5]]
@@ -200,16 +175,3 @@ def test_a_recording_has_commands_measurements_bands_and_the_unknown_force(
     (tmp_path / "mixed.csv").write_text("\n".join([",".join(["time [s]", *titles, "depth [m]"]), *rows]), "utf-8")
     mixed = {name: values[0] for name, values in recording_of(tmp_path / "mixed.csv", with_mix)["commands"].items()}
     assert mixed == pytest.approx(dict.fromkeys(with_mix.layout.commands, 0.0) | {"u_sway": 0.4}, abs=1e-9)
-
-
-@pytest.mark.interop
-def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
-    csv: Path, identified: Path, replay: Callable[..., Any]
-) -> None:
-    page = replay(csv, "--identified", str(identified))
-    page.evaluate("() => { live.flight.seek(15); live.draw(); }")
-    assert chart(page, "heave")["words"].endswith("± 1.50")
-    page.select_option("#live-view", "force")
-    until(page, "!live.changed")
-    assert chart(page, "heave")["title"] == "heave: unknown 3.00 N"
-    assert page.get_attribute("#live-chart-heave", "aria-label") == "Over time: heave: unknown 3.00 N"

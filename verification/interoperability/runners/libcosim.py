@@ -1,6 +1,6 @@
 """libcosim, with inputs from a manipulator.
 
-cs: one slave; ssp: an SSP archive; osp: an OSP configuration. The files of ssp and osp contain the parameters.
+cs: one slave; ssp: an SSP archive, which contains the parameters.
 """
 
 import sys
@@ -12,7 +12,7 @@ from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from rov_fmu.bridges.system.ssp import ssp_content, write_osp
+from rov_fmu.bridges.system.ssp import ssp_content
 from verification.interoperability.runners.flight import AT_START, FMU, OUTPUTS, Step, fly, parameters
 from verification.interoperability.runners.system import dive
 
@@ -27,9 +27,6 @@ match sys.argv[1]:
     case "ssp":
         Path("dive.ssp").write_bytes(ssp_content(dive()))
         execution = CosimExecution.from_ssp_file("dive.ssp", STEP)
-    case "osp":
-        write_osp(Path("OspSystemStructure.xml"), dive())
-        execution = CosimExecution.from_osp_config_file("OspSystemStructure.xml")
 
 rov = execution.slave_index_from_instance_name("rov")
 reference = {variable.name.decode(): variable.reference for variable in execution.slave_variables(rov)}
