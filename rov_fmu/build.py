@@ -4,7 +4,6 @@ import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -24,18 +23,15 @@ from rov_fmu.c.compile import (
     is_zig,
 )
 from rov_fmu.c.prebuilt import prebuilt_binaries
-from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.archive import archive, is_unchanged
 from rov_fmu.fmu.content import FmuContent, native_content, python_content, web_module
-from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmus.fmu import Fmu
 from rov_fmu.fmus.instance import RunError
 from rov_fmu.io.file_kinds import FMU
-from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
+from rov_fmu.io.messages import InputError, did_you_mean, shown
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import open_file
-from rov_fmu.prove.check import check_evidence
-from rov_fmu.prove.signature import check_private_key, check_signature, signature_path, signed
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
@@ -74,7 +70,6 @@ def build_fmu(
     backend: str = "native",
     fmi: int = 2,
     interface: str | None = None,
-    sign: Path | None = None,
     force: bool = False,
     inputs: Sequence[Path] = (),
     on_content: Callable[[Sequence[str]], None] = lambda _: None,
@@ -89,7 +84,6 @@ def build_fmu(
     - `fmi`: the version of FMI, 2 or 3. `pythonfmu` needs 2.
     - `interface`: `cs` for Co-Simulation, `me` for Model Exchange, or `both`, which is the default; the FMU in pure
       Python has only `cs`, and so has that of a vehicle with `current = "passes"`.
-    - `sign`: the file of a private key of OpenSSH, with which ssh-keygen signs the FMU in <output>.sig.
     - `force`: True to replace files that this program did not write, or that have changed since.
     - `inputs`: further files that must not be overwritten, like those that the vehicle names.
     - `on_content`: called with the platforms once the content is made and the compilers begin.
@@ -98,7 +92,7 @@ def build_fmu(
         rov_fmu.build_fmu(rov_fmu.load("videoray"), "videoray.fmu", platforms="host").path
 
     Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
-    OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
+    OptionError if another argument is invalid; BuildError if the build fails; FileError if a file of the
     vehicle cannot be read, or if `output` does not end with .fmu; WriteError, an OSError, if a path cannot be written.
     """
     _check_options(vehicle, backend, fmi, interface)
@@ -106,21 +100,7 @@ def build_fmu(
     interface = interface or ("both" if native and not vehicle.layout.before else "cs")
     version = {2: "", 3: ".fmi3"}[fmi]
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
-    if sign:
-        check_private_key(sign)
-    signature = signature_path(output)
-    targets = [(output, FMU), (signature if sign else None, "")]
-
-    def is_ours(path: Path) -> bool:
-        """Return True for an FMU of this program that nobody has changed since, and for the signature that fits it."""
-        try:
-            return bool(check_signature(output) if path == signature else check_evidence(path).files)
-        except (FileError, InputError, ProofError):
-            return False
-
-    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])], force=force, is_ours=is_ours)
-    if not sign and not force and signature.is_file():
-        raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
+    check_targets([(output, FMU)], [*inputs, *vehicle.files], force=force, is_ours=is_unchanged)
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, chosen, fmi=fmi, interface=interface)
     binaries = prebuilt_binaries(content.identifier, content.guid, chosen or [])
@@ -138,12 +118,11 @@ def build_fmu(
     missing = [name for name in chosen or [] if name not in binaries]
     binaries |= compile_all(missing, content.sources, content.identifier, done, fmi)
     files = with_binaries(content, binaries, fmi)
-    packed = archive(files, partial(meta_data, vehicle, files))
+    packed = archive(files)
     lost = sorted(_platforms_in(output) - _folders(files))
-    beside = [Output(signature, signed(packed, sign))] if sign else []
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
-    written = write_whole(draft, *beside, force=force, is_ours=is_ours)
+    written = write_whole(draft, force=force, is_ours=is_unchanged)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], written, lost)
 

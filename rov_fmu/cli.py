@@ -247,11 +247,6 @@ def _commands(context: click.Context) -> None:
     metavar="NAME",
     help=f"Platform to compile for: host, {', '.join(PLATFORMS)}. It may be repeated; the default is all with 64 bits.",
 )
-@_file_option(
-    "--sign",
-    metavar="KEY",
-    help="Private key of OpenSSH that signs the FMU. The signature is FILE.fmu.sig.",
-)
 @_force_option()
 def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **options: Any) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
@@ -631,22 +626,8 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
     default=60.0,
     help="Time for each experiment. The default is 60 s.",
 )
-@_file_option(
-    "--key",
-    metavar="KEY.pub",
-    help="Public key that must have signed the FMU. Without it, any key may have.",
-)
-@_file_option(
-    "--report",
-    metavar="FILE",
-    help="Page (HTML) to write, with more evidence.",
-)
-@_force_option()
 def _prove(fmu: Path, **options: Any) -> None:
-    """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results.
-
-    First, the hashes in the FMU and the signature beside it are checked, if there are any.
-    """
+    """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results."""
     if str(fmu) in SHIPPED and not fmu.exists():
         raise FileError(f"{fmu}: must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
     from rov_fmu.interface.prove_command import print_proof_of

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -73,7 +72,6 @@ WRITING = {
     ("sitl", "log"): Command("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
     ("export", "output"): Command("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
     ("export", "folder"): Command("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
-    ("prove", "report"): Command("proof.html", "prove {fmu} --report {f}/proof.html"),
     ("system", "output"): Command("my.ssp", f"system {_SYSTEM} -o {{f}}/my.ssp"),
     ("study", "output"): Command("study.html", "study {f}/plan.toml -o {f}"),
     ("identify", "output"): Command("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
@@ -84,7 +82,6 @@ WRITING = {
 """What each option of a command writes. A study, an exported folder and the files beside an FMU name their files."""
 READING = {
     ("build", "vehicle"): "build videoray.toml",
-    ("build", "sign"): "build videoray.toml --sign key.fmu",
     ("list", "folder"): "list tests",
     ("simulate", "vehicle"): "simulate videoray.toml",
     ("simulate", "commands"): "simulate videoray.toml --input points.csv",
@@ -95,7 +92,6 @@ READING = {
     ("export", "vehicle"): "export --to sdf videoray.toml",
     ("export", "gains"): "export videoray --to ardusub-gains --gains points.csv",
     ("prove", "fmu"): "prove videoray.fmu",
-    ("prove", "key"): "prove videoray.fmu --key key.pub",
     ("system", "plan"): "system current.toml",
     ("study", "plan"): "study study.json",
     ("identify", "tests"): "identify tests/steady_surge.csv",
@@ -180,11 +176,3 @@ def endless_compiler(folder: Path) -> dict[str, str]:
     )
     zig.chmod(0o755)
     return {"PYTHONPATH": str(zig.parent.parent)}
-
-
-def make_key(path: Path, secret: str = "") -> None:
-    """Write a private key to a path, and the public one beside it, or skip the test where OpenSSH is not installed."""
-    if not shutil.which("ssh-keygen"):
-        pytest.skip("OpenSSH makes the keys")
-    made = ["ssh-keygen", "-q", "-t", "ed25519", "-N", secret, "-f", str(path)]
-    subprocess.run(made, check=True, capture_output=True)

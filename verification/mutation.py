@@ -78,10 +78,8 @@ TESTS = {
     "rov_fmu/identify/inspection/*": "frozen/test_known_results.py interface/test_inspect_command.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify frozen/test_known_results.py",
     "rov_fmu/fmu/card.py": "frozen/test_known_results.py fmu/results/test_card.py report/test_card.py fmu",
-    "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
+    "rov_fmu/prove/experiments.py": "prove/test_properties.py cli/test_prove.py",
     "rov_fmu/prove/proof.py": "cli/test_prove.py prove",
-    "rov_fmu/prove/check.py": "prove/test_properties.py fmu/results/test_evidence.py",
-    "rov_fmu/prove/signature.py": "fmu/results/test_evidence.py",
     "rov_fmu/prove/*": "prove",
     "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_properties.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
@@ -95,7 +93,6 @@ TESTS = {
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
     "rov_fmu/report/page/recording.py": "tank/test_several_files.py report/fly",
     "rov_fmu/report/page/*": "frozen/test_known_results.py report/test_properties.py report/test_fmu_page.py report",
-    "rov_fmu/report/proof_page.py": "prove",
     "rov_fmu/report/console_log.py": "frozen/test_known_results.py interface/test_inspect_command.py",
     "rov_fmu/report/console_results.py": "frozen/test_known_results.py identify/test_tuning.py",
     "rov_fmu/report/console.py": "report/test_console.py cli/test_prove.py fmu/results/test_evidence.py",
@@ -112,7 +109,7 @@ TESTS = {
     "rov_fmu/bridges/*": "bridges",
     "rov_fmu/io/columns.py": "io/test_csv_table.py",
     "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "
-    "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_experiments.py study/test_plans.py "
+    "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_properties.py study/test_plans.py "
     "cli/test_messages.py io",
     "rov_fmu/fmu/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py frozen/test_known_results.py",

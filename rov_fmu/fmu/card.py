@@ -5,7 +5,7 @@ file documentation/model_card.txt, and in the annotations of modelDescription.xm
 own in the pages; the text has it in words.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from textwrap import fill
 
 from rov_fmu.equation.catalogue import AXES
@@ -15,7 +15,7 @@ from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
-from rov_fmu.vehicle.description import UNIT_OF_RANGE, VERDICT
+from rov_fmu.vehicle.description import UNIT_OF_RANGE
 from rov_fmu.vehicle.steady import beyond_stated, speed_table
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
@@ -115,26 +115,6 @@ def _speeds(vehicle: Vehicle) -> Iterator[str]:
             power = "" if one.power is None else f" and {significant(one.power, 3)} W"
             parts.append(f"{one.velocity:.3g} {one.axis.unit} at {one.command:.0%} with {thrust}{power}")
         yield f"{motion.capitalize()}: {'; '.join(parts)}."
-
-
-def read_card(text: str) -> dict[str, list[str]]:
-    """Return the paragraphs of a card by their headings, from the text that `card_text` wrote."""
-    headings: dict[str, list[str]] = {}
-    paragraphs: list[str] = []
-    for line in text.splitlines():
-        if line.startswith("- "):
-            paragraphs.append(line[2:])
-        elif line.startswith("  ") and paragraphs:
-            paragraphs[-1] += f" {line.strip()}"
-        elif line:
-            paragraphs = headings.setdefault(line, [])
-    return headings
-
-
-def not_to_use(headings: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the paragraphs of a card about the axes that must not be used."""
-    verdicts = map(VERDICT.fullmatch, headings.get("How far to trust it", ()))
-    return [found[0] for found in verdicts if found and found[2] == "do not use"]
 
 
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rov_fmu.fmu.archive import CARD, FOLDER, META_DATA
+from rov_fmu.fmu.archive import CARD, FOLDER
 from rov_fmu.io.paths import name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.templates import render
@@ -38,11 +38,9 @@ class Related:
 
 
 def manifest(related: Iterable[Related]) -> bytes:
-    """Return fmi-ls-manifest.xml, which names these files, the model card and the meta-data."""
+    """Return fmi-ls-manifest.xml, which names these files and the model card."""
     card = Related(f"../../{CARD}", "report", "text/plain", "Model card")
-    words = "Hashes of the files, of what they were made from, and of the program"
-    hashes = Related(f"../../{META_DATA}", "meta-data", "application/x-srmd-meta-data", words)
-    return render("fmi-ls-manifest.xml.j2", related=[*related, card, hashes]).encode()
+    return render("fmi-ls-manifest.xml.j2", related=[*related, card]).encode()
 
 
 def documents(vehicle: Vehicle) -> Iterator[Related]:

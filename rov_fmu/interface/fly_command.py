@@ -23,7 +23,8 @@ def write_fly_page(
 
     Return its path, with what it replaced.
 
-    `recording` is a log that is flown beside the measurements. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
+    `recording` is a log that is flown beside the measurements. Without `output` the page goes into a new temporary
+    folder. Raises FileError and OSError.
     """
     vehicles = [load_vehicle(path) for path in paths]
     for words in beyond_stated(vehicles[0]):

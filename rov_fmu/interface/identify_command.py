@@ -60,7 +60,8 @@ def identify_tests(
     """Identify a vehicle from a folder of tank tests, or from logs in one folder, and write the files that are asked
     for.
 
-    These are the vehicle file and the report. `base` replaces the vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
+    These are the vehicle file and the report. `base` replaces the vehicle to begin from that rov.toml names. Without a
+    rov.toml, the vehicle that the logs seem to be of is assumed.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. `on_answer` is called

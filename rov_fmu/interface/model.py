@@ -360,7 +360,6 @@ class VehicleModel(Vehicle):
         backend: str = "native",
         fmi: int = 2,
         interface: str | None = None,
-        sign: Path | None = None,
         force: bool = False,
     ) -> "Built":
         """Build the FMU of the vehicle.
@@ -378,6 +377,5 @@ class VehicleModel(Vehicle):
             backend=backend,
             fmi=fmi,
             interface=interface,
-            sign=sign,
             force=force,
         )

@@ -13,7 +13,7 @@ from lxml import etree
 
 from rov_fmu.fmu.archive import MANIFEST
 from rov_fmu.io.csv_table import Series, finite, read_series
-from rov_fmu.io.messages import FileError, brief, shown
+from rov_fmu.io.messages import FileError, shown
 from rov_fmu.io.reading import check_size, root_of_xml
 
 DEFAULT_TOLERANCE = 1e-3
@@ -25,8 +25,6 @@ MOST_STEPS = 1_000_000
 _MOST_EXPERIMENTS = 1000
 _MOST_BYTES = 20_000_000
 """The largest size of a file of the experiments."""
-_MOST_TOLD = 500
-"""The most characters of what an FMU says of its experiments."""
 _NON_NUMERIC = ("String", "Binary", "Clock")
 """The types whose variables cannot be columns of numbers."""
 
@@ -47,8 +45,6 @@ class Experiment:
     parameters: Mapping[str, str]
     stimuli: Series | None
     references: Series | None
-    told: str = ""
-    """What the FMU says of the experiments of a file, such as where their results come from."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +136,6 @@ class _Reader:
     def read(self, member: _Member) -> Iterator[Experiment]:
         """Read a file of experiments."""
         root = member.xml("Experiments")
-        told = brief(root.get("description", ""), _MOST_TOLD)
         for element in root.iterfind("{*}Experiment"):
             name = element.get("name", "")
             where = f"experiment {shown(name)}"
@@ -166,7 +161,7 @@ class _Reader:
             stimuli, references = (
                 self._series(files[part]) if part in files else None for part in ("Stimuli", "References")
             )
-            yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references, told)
+            yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
     def _parameters(self, member: _Member) -> dict[str, str]:
         """Read a parameter set in the format of SSP, and return its values as text by name."""

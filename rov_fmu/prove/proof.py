@@ -1,6 +1,7 @@
 """Prove an FMU: run the experiments that it contains with FMPy, and compare the results with the expected ones."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from pathlib import Path
@@ -8,15 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.fmus.description import TIME_LIMIT
-from rov_fmu.fmus.instance import last_message
+from rov_fmu.fmus.description import TIME_LIMIT, budget, read_description
+from rov_fmu.fmus.instance import Unpacked, last_message
+from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.fmus.variable import Variable
-from rov_fmu.io.child_process import ChildError, LimitError
+from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.io.csv_table import Series
+from rov_fmu.io.file_kinds import FMU, check_suffix
+from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, silent
-from rov_fmu.prove.experiments import Experiment
-from rov_fmu.prove.runs import Runs
-from rov_fmu.prove.subject import Subject, opened
+from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES
+from rov_fmu.io.reading import open_file
+from rov_fmu.prove.experiments import Experiment, read_experiments
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
 """FMPy's name of each interface, by the name on the command line."""
@@ -70,40 +74,48 @@ def prove_fmu(
 
     Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """
-    with opened(Path(fmu), interface, tolerance, time_limit, needs_results=True) as subject:
-        return compare(subject, on_experiment)
+    import fmpy
 
-
-def compare(subject: Subject, on_experiment: Progress = silent) -> list[ProofFinding]:
-    """Run the experiments of an FMU and compare the results, as `prove_fmu` does."""
-    fmu, wanted = subject.path, subject.interface
-    has = [name for name, of in INTERFACES.items() if getattr(subject.description, of)]
-    if not has or (wanted and wanted not in has):
-        raise FileError(f"{fmu}: has no {wanted or 'interface that can be run'}, only {', '.join(has) or 'none'}")
-    chosen = [replace(x, tolerance=subject.tolerance or x.tolerance) for x in subject.experiments]
-    experiment, findings = chosen[0], list[ProofFinding]()
-    try:
-        with subject.runs(kind=_Experiments) as child:
-            for n, experiment in enumerate(chosen):
-                on_experiment(experiment.name, n / len(chosen))
-                findings += child.call("findings", experiment, wanted or has[0])
-    except ChildError as error:
-        where = one_line(f"{fmu}: experiment {experiment.name!r}")
-        raise ProofError(f"{where}: the FMU {error}{remedy(error)}") from error
+    fmu = Path(fmu)
+    check_suffix(fmu, FMU)
+    TIME_LIMITS.checked("time_limit", time_limit)
+    if tolerance is not None:
+        TOLERANCES.checked("tolerance", tolerance)
+    with temporary_folder("fmu-") as folder:
+        with open_file(fmu) as file:
+            unpack_fmu(file, fmu, Path(folder))
+        description = read_description(fmu, Path(folder))
+        experiments = [
+            replace(one, tolerance=tolerance or one.tolerance)
+            for one in read_experiments(fmu, Path(folder), description)
+        ]
+        platforms = fmpy.supported_platforms(folder)
+        if fmpy.platform not in platforms:
+            there = ", ".join(platforms) or "none"
+            raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {there}")
+        has = [name for name, of in INTERFACES.items() if getattr(description, of)]
+        if not has or (interface and interface not in has):
+            what = interface or "interface that can be run"
+            raise FileError(f"{fmu}: has no {what}, only {', '.join(has) or 'none'}")
+        findings, experiment = list[ProofFinding](), experiments[0]
+        try:
+            with closing(ChildProcess(_Experiments, folder, limits=budget(time_limit))) as child:
+                for n, experiment in enumerate(experiments):
+                    on_experiment(experiment.name, n / len(experiments))
+                    findings += child.call("findings", experiment, interface or has[0])
+        except ChildError as error:
+            where = one_line(f"{fmu}: experiment {experiment.name!r}")
+            more = "; --time-limit allows more" if isinstance(error, LimitError) and error.limit == "time" else ""
+            raise ProofError(f"{where}: the FMU {error}{more}") from error
     return findings
 
 
-def remedy(error: Exception) -> str:
-    """Return how to get more of what an FMU had too little of, to follow the error; an empty text if nothing helps."""
-    return "; --time-limit allows more" if isinstance(error, LimitError) and error.limit == "time" else ""
-
-
-def least_divisor(variable: Variable) -> float:
+def _least_divisor(variable: Variable) -> float:
     """Return the least divisor of a deviation of a variable; without a nominal value, that of 1."""
     return _SHARE_OF_NOMINAL * (abs(variable.nominal) or 1.0)
 
 
-class _Experiments(Runs):
+class _Experiments(Unpacked):
     """The experiments of an unpacked FMU."""
 
     def findings(self, experiment: Experiment, interface: str) -> list[ProofFinding]:
@@ -119,7 +131,7 @@ class _Experiments(Runs):
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         findings = []
         for name, values in zip(names, expected, strict=True):
-            scale = max(float(np.abs(values).max()), least_divisor(self.variables[name]))
+            scale = max(float(np.abs(values).max()), _least_divisor(self.variables[name]))
             off = _deviation(result["time"], result[name], times, values)
             findings.append(ProofFinding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
         return findings

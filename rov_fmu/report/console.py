@@ -20,8 +20,6 @@ from rich.text import Text
 from rov_fmu.io.messages import listed, one_line, wrapped
 
 if TYPE_CHECKING:
-    from rov_fmu.prove.check import MetaData
-    from rov_fmu.prove.claims import Proof
     from rov_fmu.prove.proof import ProofFinding
 
 DEVIATION = "+.1%"
@@ -147,24 +145,6 @@ def print_proof(findings: "Sequence[ProofFinding]") -> None:
             if not f.passed:
                 found.add_row(experiment, *_deviation(f), "FAIL", f.error or f.variable)
     print_table(found, out)
-
-
-def print_evidence(evidence: "MetaData") -> None:
-    """Print what the hashes in an FMU and its signature say."""
-    paragraph(console(), evidence.words)
-
-
-def print_claims(proof: "Proof") -> None:
-    """Print the result and the figure of every claim about an FMU, and why a claim was not checked."""
-    from rov_fmu.fmu.card import not_to_use, read_card  # with the vehicle's modules, which few commands need
-
-    found = table("", "claim", (), ("result", "figure"))
-    for claim, evidence in proof.evidence:
-        reason = evidence.sentence if evidence.result == "does not apply" else ""
-        found.add_row(claim.name.lower(), evidence.result, evidence.figure or reason)
-    print_table(found)
-    for words in not_to_use(read_card(proof.card)):
-        paragraph(console(), words)
 
 
 def _deviation(f: "ProofFinding") -> tuple[str, str]:

@@ -38,9 +38,7 @@ READING: dict[str, tuple[str, str]] = {
     "the FMU of a plan": ("rov.fmu", "study {f}/of_fmu.toml -o {f}/results"),
     "the commands": ("commands.csv", "simulate {f}/videoray.toml --input {f}/commands.csv"),
     "the recording": ("log.csv", "fly {f}/videoray.toml --recording {f}/log.csv -o {f}/fly.html"),
-    "the key": ("key", "build {f}/videoray.toml --sign {f}/key"),
     "the FMU": ("rov.fmu", "prove {f}/rov.fmu"),
-    "the signature": ("rov.fmu.sig", "prove {f}/rov.fmu"),
 }
 PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
 """The cases whose file may be missing, because a neutral picture replaces it."""
@@ -66,8 +64,6 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "of_fmu.toml").write_text(plan, encoding="utf-8")
     (folder / "commands.csv").write_text("time,u_l\n0,0.3\n", encoding="utf-8")
     (folder / "log.csv").write_text("time [s],depth [m]\n0,1\n", encoding="utf-8")
-    for name in ("key", "rov.fmu.sig"):
-        (folder / name).write_text("no key", encoding="utf-8")
     with zipfile.ZipFile(folder / "rov.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
     refit = SHIPPED["videoray_refit"].read_text(encoding="utf-8")
@@ -136,7 +132,7 @@ _CASES = [
     *(
         pytest.param(case, _gone, marks=() if n % 2 else pytest.mark.weekly)
         for n, case in enumerate(READING)
-        if case not in {*PICTURES, "a tank test", "rov.toml", "the signature"}
+        if case not in {*PICTURES, "a tank test", "rov.toml"}
     ),
     *(
         pytest.param(case, _gone_as_it_is_read, marks=pytest.mark.weekly if case in _SLOW else ())

@@ -13,7 +13,7 @@ import pytest
 from pythonfmu import FmuBuilder
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import FOLDER, MANIFEST, META_DATA
+from rov_fmu.fmu.archive import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.prove.proof import prove_fmu
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -25,11 +25,8 @@ Files = Mapping[str, str | None]
 
 
 def _with(fmu: Path, files: Files, path: Path, begin: str = "/", change: Change = bytes) -> Path:
-    """Write a copy of an FMU with these files, and with changed members whose name begins with `begin`.
-
-    It has no hashes, so that it may differ. Return its path.
-    """
-    changed = {META_DATA: None} | {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
+    """Write a copy of an FMU with these files, and with changed members whose name begins with `begin`."""
+    changed = {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
         for member in set(old.namelist()) - changed.keys():
             content = old.read(member)

@@ -81,11 +81,10 @@ _WORK = (
     "rov_fmu.interface.fly_command.fly_page",
     "rov_fmu.interface.simulate_command.simulation_of",
     "rov_fmu.interface.tune_command.tune",
-    "rov_fmu.interface.prove_command.prove_claims",
     "rov_fmu.study.study_command.do_study",
     "rov_fmu.build.compile_all",
 )
-_SLOW = ("build", "study", "identify", "inspect", "prove")
+_SLOW = ("build", "study", "identify", "inspect")
 _OFTEN = (("study", "output"), ("identify", "output"))
 
 

@@ -23,7 +23,6 @@ from tests.commands import (
     TESTS,
     WRITING,
     Command,
-    make_key,
     run_elsewhere,
     without_progress,
 )
@@ -217,9 +216,8 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "report.html": "a report",
         "points.csv": "time,command [%],velocity [m/s]\n0,20,0.1\n",
         "study.json": 'vehicle = "videoray.toml"\nstop_time = 1.0\n',
-        **dict.fromkeys(("videoray.fmu", "key.pub"), "is read once the output is checked"),
+        **dict.fromkeys(("videoray.fmu",), "is read once the output is checked"),
     }
-    make_key(folder / "key.fmu")
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder

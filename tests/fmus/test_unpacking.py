@@ -86,7 +86,7 @@ def test_prove_and_study_refuse_it_in_one_line(tmp_path: Path, capsys: pytest.Ca
     add, message = BAD["a path upwards"]
     (tmp_path / "bad.fmu").write_bytes(_archive(add).getvalue())
     (tmp_path / "plan.toml").write_text(_STUDY)
-    for command in (["prove", "bad.fmu", "--report", "a.html"], ["study", "plan.toml", "-o", "results"]):
+    for command in (["prove", "bad.fmu"], ["study", "plan.toml", "-o", "results"]):
         assert main([command[0], *(str(tmp_path / one) if "." in one else one for one in command[1:])]) == 2
         out, err = capsys.readouterr()
         assert (out, err.count("\n")) == ("", 1)
@@ -129,7 +129,7 @@ def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp
     content = bytearray(_archive(_member("resources/zeros.bin", bytes(20_000_000))).getvalue())
     for sign, offset in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
         struct.pack_into("<I", content, content.rindex(sign) + offset, 1000)
-    with pytest.raises(FileError, match=r"^a\.fmu: member 'resources/zeros.bin': its header and its content must"):
+    with pytest.raises(FileError, match=r"^a\.fmu: is not an FMU, or is damaged: Bad CRC-32"):
         unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
     assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
 

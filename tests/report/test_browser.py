@@ -1,4 +1,4 @@
-"""What a person sees who opens the FMU's page, an identification report, or the evidence of a proof, in Chromium."""
+"""What a person sees who opens the FMU's page, or an identification report, in Chromium."""
 
 import json
 import re
@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.inspection.inspected import inspect_paths
-from rov_fmu.prove.claims import prove_claims
 from rov_fmu.report.inspection_page import inspection_page
-from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -52,14 +50,6 @@ def documentation(videoray_dir: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def evidence(videoray_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The evidence of `rov-fmu prove --report`."""
-    path = tmp_path_factory.mktemp("evidence") / "evidence.html"
-    path.write_text(proof_page(prove_claims(videoray_fmu)), encoding="utf-8")
-    return path
-
-
-@pytest.fixture(scope="module")
 def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What `rov-fmu inspect --report` writes about a dive."""
     folder = tmp_path_factory.mktemp("inspection")
@@ -69,7 +59,7 @@ def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("width", "scheme"), SCREENS)
-@pytest.mark.parametrize("name", ["documentation", "report", "comparison", "evidence", "inspection"])
+@pytest.mark.parametrize("name", ["documentation", "report", "comparison", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
 ) -> None:

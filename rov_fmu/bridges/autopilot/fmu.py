@@ -7,7 +7,6 @@ parameters, the tables of the thrusters constants of the code.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
@@ -20,7 +19,6 @@ from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
-from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
 from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
 from rov_fmu.io.templates import render
@@ -161,4 +159,4 @@ def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, 
     expected = expected_of_autopilot(autopilot, model)
     content = native_content(model, expected, fmi=fmi, interface="cs", platforms=chosen)
     files = with_binaries(content, compile_all(chosen, content.sources, content.identifier, fmi=fmi), fmi)
-    return archive(files, partial(meta_data, autopilot.vehicle, files, summary=model.summary))
+    return archive(files)

@@ -1,6 +1,5 @@
 """Write a system of FMUs for co-simulation tools, as SSP 1.0, and read it from SSP."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -27,9 +26,6 @@ PARAMETER_SET = "initial_values"
 _STRUCTURE = "SystemStructure.ssd"
 _MOST_BYTES = 40_000_000
 """The largest structure or parameter set that is read."""
-_MARK = b"rov-fmu system wrote this file. SHA-256 of what precedes its end: "
-_END = 22
-"""The bytes of the end of an archive without a comment (APPNOTE 4.3.16)."""
 
 
 @dataclass(frozen=True)
@@ -61,29 +57,12 @@ class System:
 
 
 def ssp_content(system: System) -> bytes:
-    """Return the SSP archive: the structure, and for each component its FMU and a parameter set (SSV).
-
-    Its comment has a digest, by which `is_unchanged` knows the file.
-    """
+    """Return the SSP archive: the structure, and for each component its FMU and a parameter set (SSV)."""
     files = {_STRUCTURE: _rendered("SystemStructure.ssd.j2", system=system).encode()}
     for name, component in system.components.items():
         files[f"resources/{component.fmu}"] = component.content
         files[f"resources/{name}.ssv"] = parameter_set(component).encode()
-    packed = archive(files)
-    comment = _comment(packed)
-    return packed[:-2] + len(comment).to_bytes(2, "little") + comment
-
-
-def is_unchanged(path: Path) -> bool:
-    """Return True for an SSP of this program that nobody has changed since."""
-    content = read_bytes(path)
-    packed, mark, _ = content.rpartition(_MARK)
-    return bool(mark) and content == packed + _comment(packed)
-
-
-def _comment(packed: bytes) -> bytes:
-    """Return the comment for an archive, which tells that it is as it was written."""
-    return _MARK + hashlib.sha256(packed[:-_END]).hexdigest().encode()
+    return archive(files)
 
 
 def parameter_set(component: Component) -> str:

@@ -16,8 +16,9 @@ from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system, system_csv
-from rov_fmu.bridges.system.ssp import is_unchanged, ssp_content
+from rov_fmu.bridges.system.ssp import ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
+from rov_fmu.fmu.archive import is_unchanged
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM
 from rov_fmu.io.messages import FileError

@@ -13,8 +13,9 @@ from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.connections import MismatchError, SystemStructure, connected, loop
 from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
-from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
+from rov_fmu.bridges.system.ssp import read_ssp
 from rov_fmu.cli import main
+from rov_fmu.fmu.archive import is_unchanged
 from rov_fmu.fmu.terminals import port_of
 from rov_fmu.fmus import fmu
 from rov_fmu.fmus.description import described as described_here

@@ -1,11 +1,11 @@
-"""The model card says where a vehicle holds, and can be read again from its text; whole cards are in tests/frozen."""
+"""The model card says where a vehicle holds; whole cards are in tests/frozen."""
 
 from dataclasses import replace
 
 import pytest
 
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
-from rov_fmu.fmu.card import card, card_text, read_card, with_speeds
+from rov_fmu.fmu.card import card, card_text
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, tied
 
@@ -14,11 +14,10 @@ _ROVS |= {path.stem: load_vehicle(path) for path in (EVERYTHING, THRUST_EFFECTS)
 
 
 @pytest.mark.parametrize("name", _ROVS)
-def test_a_card_is_read_as_it_was_written(name: str) -> None:
+def test_the_lines_of_a_card_are_short(name: str) -> None:
     rov = replace(_ROVS[name], limits=(f"Words: {'long' * 20}{' and short' * 20}.", "long" * 30))
     text = card_text(rov)
     assert [line for line in text.splitlines() if len(line) > 100] == [f"- {'long' * 30}"]
-    assert read_card(text) == {f"Model card of {rov.name}": [], **with_speeds(rov)}
 
 
 def _holds(rov: Vehicle) -> list[str]:
