@@ -242,7 +242,7 @@ PICTURES = {
     "report_dive.webp": Picture(_report_of_dive, _REPORT),
     "no_velocity_sensor.webp": Picture(_no_velocity, _REPORT),
     "study.webp": Picture(
-        _study, (*_PAGE, *_PLOTS, "rov_fmu/report/templates/study.html.j2", "rov_fmu/study/results/plots.py")
+        _study, (*_PAGE, *_PLOTS, "rov_fmu/report/templates/study.html.j2", "rov_fmu/study/plots.py")
     ),
     "ardusub.webp": Picture(_flight, _LOGS),
     "mujoco.webp": Picture(_mujoco, ("rov_fmu/bridges/mujoco/*.py", "rov_fmu/report/plots/geometry.py")),

@@ -29,7 +29,7 @@ from rov_fmu.report.page import equations
 from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.plots.svg import name_axes, svg_file
 from rov_fmu.report.templates import number
-from rov_fmu.study.plan.plan import InputFile, InputSignal, Keep, Plan, Varied
+from rov_fmu.study.plan import InputFile, InputSignal, Keep, Plan, Varied
 from rov_fmu.tank import catalogue
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting_frames
 from rov_fmu.vehicle.json_schema import json_schema

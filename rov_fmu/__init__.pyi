@@ -53,9 +53,9 @@ from rov_fmu.io.output import WriteError as WriteError
 from rov_fmu.prove.experiments import NoResultsError as NoResultsError
 from rov_fmu.prove.proof import ProofFinding as ProofFinding
 from rov_fmu.prove.proof import prove_fmu as prove_fmu
-from rov_fmu.study.plan.plan import PlanError as PlanError
-from rov_fmu.study.results.results import Results as Results
-from rov_fmu.study.run.run_study import run_study as run_study
+from rov_fmu.study.plan import PlanError as PlanError
+from rov_fmu.study.results import Results as Results
+from rov_fmu.study.run import run_study as run_study
 from rov_fmu.tank.findings import Finding as Finding
 from rov_fmu.vehicle.shipped import SHIPPED as SHIPPED
 from rov_fmu.vehicle.shipped import find_vehicle as find_vehicle

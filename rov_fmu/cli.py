@@ -674,16 +674,10 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use, tcp://host:8786.")
 @click.option(
-    "--engine",
-    type=_Choice(["lanes", "fmu"]),
-    help="What runs a vehicle: its equations in this process, which is the default, or its FMU in processes.",
-)
-@click.option(
     "--part",
     metavar="K/N",
     help="Do part K of N alone, as in --part 3/64, also beside others.",
 )
-@click.option("--merge", is_flag=True, help="Do no run. Check the files of all parts in RESULTS, and write the page.")
 @_force_option()
 def _study(plan: Path, output: Path, **options: Any) -> None:
     """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.

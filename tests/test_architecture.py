@@ -80,7 +80,6 @@ LARGER_FOLDERS = {
     "tests/tank/readers": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
-    "tests/study": 13,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""
 

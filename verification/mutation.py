@@ -98,14 +98,13 @@ TESTS = {
     "rov_fmu/report/console.py": "report/test_console.py cli/test_prove.py fmu/results/test_evidence.py",
     "rov_fmu/report/progress.py": "report/test_console.py cli/test_terminal.py",
     "rov_fmu/report/*": "frozen/test_known_results.py report/test_report.py report",
-    "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_properties.py study",
-    "rov_fmu/study/*": "frozen/test_known_results.py study/test_study.py study/test_figures.py study",
+    "rov_fmu/study/*": "study",
     "rov_fmu/interface/sitl_command.py": "bridges/test_sitl.py cli/test_targets.py",
     "rov_fmu/interface/export_command.py": "interface/test_export_command.py bridges",
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/autopilot/*": "autopilot bridges/autopilot bridges/test_ardusub_gains.py bridges/test_allocation.py",
-    "rov_fmu/fmus/*": "fmus prove cli/test_prove.py bridges/system study/test_kinds.py study/test_systems.py",
+    "rov_fmu/fmus/*": "fmus prove cli/test_prove.py bridges/system study",
     "rov_fmu/bridges/*": "bridges",
     "rov_fmu/io/columns.py": "io/test_csv_table.py",
     "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "
@@ -117,7 +116,7 @@ TESTS = {
     "vehicle/test_properties.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
-    "rov_fmu/cli.py": "interface/test_inspect_command.py fmu/test_build_failures.py cli study/test_page.py",
+    "rov_fmu/cli.py": "interface/test_inspect_command.py fmu/test_build_failures.py cli study",
     "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",
 }
 """The default tests of each file, in the folder tests/, besides those that import it. The first pattern counts."""

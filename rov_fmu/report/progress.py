@@ -230,10 +230,6 @@ class StudyProgress:
     total: int
     failed: int
     """The number of runs that failed in this call."""
-    dashboard: str = ""
-    """The address of Dask's page about its workers, or an empty text."""
-    has_workers: bool = True
-    """False while no worker is there, so that nothing is done."""
 
 
 class StudyParts:
@@ -249,13 +245,11 @@ class StudyParts:
         """The time of the latest result, or of the first report."""
 
     def update(self, now: StudyProgress) -> None:
-        """Show how many runs are done and failed. The first call prints the address of Dask's dashboard, too."""
+        """Show how many runs are done and failed."""
         time, reports = perf_counter(), self._reports
         if not reports:
             self._parts.begin("runs")
             self._done_before, self._result = now.done, time
-            if now.dashboard and self._parts.is_shown:
-                self._parts.print(f"what the workers do: {now.dashboard}")
         elif now.done > reports[-1][1]:
             self._result = time
         reports.append((time, now.done))
@@ -264,11 +258,11 @@ class StudyParts:
         while reports[1][0] <= time - _EVERY:
             reports.popleft()
         began, before = reports[0]
-        goes_on = now.has_workers and now.done > before
+        goes_on = now.done > before
         if goes_on:
             speed = per_second((now.done - before) / max(time - began, 1e-3))
         else:
-            speed = f"{'' if now.has_workers else 'no worker is there, '}{time - self._result:.0f} s without a result"
+            speed = f"{time - self._result:.0f} s without a result"
         words = f"{speed}{f', {now.failed:,} failed' if now.failed else ''}"
         share = (now.done - self._done_before) / max(now.total - self._done_before, 1)
         self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs", goes_on=goes_on)

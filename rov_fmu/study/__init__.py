@@ -3,7 +3,7 @@
     import rov_fmu
 
     results = rov_fmu.run_study("plan.toml", "results")
-    results.runs, results.trajectories(), results.bands("u"), results.sensitivity("stopping_distance")
+    results.runs, results.trajectories(), results.bands("u")
 
 Needs the extra `study`: pip install "rov-fmu[study]".
 """

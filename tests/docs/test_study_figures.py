@@ -5,8 +5,8 @@ from math import log
 
 import numpy as np
 
-from rov_fmu.study.plan.expression import CONSTANTS, FUNCTIONS
-from rov_fmu.study.plan.figures import Figures
+from rov_fmu.study.expression import CONSTANTS, FUNCTIONS
+from rov_fmu.study.figures import Figures
 from tests.commands import ROOT
 
 DOCS = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")

@@ -52,7 +52,6 @@ from verification.tables import main as print_tables
 HERE = Path(__file__).parent
 FOLDER = HERE / "results"
 LOGS = HERE / "logs"
-STUDIES = (HERE / "studies" / "kinds", *(HERE / "saved").iterdir())
 _IDENTIFY = "identify {f} -o {f}.toml --report {f}.html"
 _VARIES = re.compile(
     r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?'
@@ -173,19 +172,6 @@ def _printed(command: str, *more: str) -> str:
     return _said(lambda: main([*command.split(), *more]))
 
 
-def _study(folder: Path) -> str:
-    """Return the page and the summary of a saved study."""
-    from rov_fmu import Results
-    from rov_fmu.study.results.page import study_page
-    from rov_fmu.study.study_command import print_summary
-
-    with TemporaryDirectory() as temporary, _without_plots("study.results.plots"):
-        results = Results(shutil.copytree(folder, Path(temporary, folder.name)))
-        summary = _said(lambda: print_summary(results, len(results.runs), 2.0))
-        page = _text(study_page(results))
-    return f"{summary}\n{page}".replace(f"{temporary}/", "")
-
-
 def _in_copy(folder: Path, options: str) -> str:
     """Return what a command prints about a copy of a folder, and what it writes beside it."""
     with TemporaryDirectory() as temporary, _without_plots():
@@ -236,7 +222,6 @@ RESULTS: dict[str, Callable[[], str]] = {
     "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
     **{f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}") for path in LOGS.iterdir()},
     "inspection_page.txt": partial(_in_copy, LOGS / "dives", "inspect {f} --report {f}.html"),
-    **{f"study_{path.name}.txt": partial(_study, path) for path in STUDIES},
     **{
         # The otter's loss of thrust with advance is hardly told: its interval ends elsewhere on each processor.
         f"identify_{path.name}.txt": partial(_in_copy, path, "identify {f}" if path.name == "otter" else _IDENTIFY)

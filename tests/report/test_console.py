@@ -130,9 +130,9 @@ def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_
 # ---- The progress of long work ---------------------------------------------------------------------------------------
 
 
-def of_study(done: int, *, failed: int = 0, has_workers: bool = True) -> StudyProgress:
+def of_study(done: int, *, failed: int = 0) -> StudyProgress:
     """Return the progress of a study."""
-    return StudyProgress(done, 12_000, failed, "http://localhost", has_workers)
+    return StudyProgress(done, 12_000, failed)
 
 
 def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: Capsys) -> None:
@@ -150,7 +150,7 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: Capsys) ->
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
     study.update(of_study(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
-    assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"
+    assert not capsys.readouterr().out
 
 
 def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,12 +162,11 @@ def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.Monk
     study = StudyParts(shown)
     for now[0], runs, words in (
         (0.0, of_study(2_000), "runs"),
-        (4.0, of_study(2_000, has_workers=False), "no worker is there, 4 s without a result"),
+        (4.0, of_study(2_000), "4 s without a result"),
         (5.0, of_study(2_100), "20 runs/s"),
         (11.0, of_study(3_300), "118 runs/s"),
         (17.0, of_study(3_900), "150 runs/s"),
         (19.0, of_study(3_900), "129 runs/s"),
-        (19.5, of_study(3_900, has_workers=False), "no worker is there, 2 s without a result"),
         (627.0, of_study(3_900, failed=7), "610 s without a result, 7 failed"),
         (637.0, of_study(4_500), "60 runs/s"),
     ):

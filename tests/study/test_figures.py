@@ -5,7 +5,7 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.study.plan.figures import Figures, unusable
+from rov_fmu.study.figures import Figures, unusable
 
 T = np.linspace(0.0, 40.0, 4001)
 FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
@@ -66,7 +66,7 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert found == pytest.approx([*[None] * 9, 6.5])
     far, others, zero, late, half, choice, *infinite = reason.split("; ")
     assert half == "half: an index must be a whole number"
-    assert choice.startswith("choice: an array is neither true nor false: write any(...) or all(...)")
+    assert choice.startswith("choice: The truth value of an array with more than one element is ambiguous.")
     assert infinite == ["none: is NaN", "never: is NaN", "end: is infinite"]
     assert far == "far: index 9999 is out of bounds for axis 0 with size 4001"
     assert others == "all: must be one number, and not an array"

@@ -13,7 +13,7 @@ from rov_fmu.bridges.system.ssp import Component, System, ssp_content
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive
 from rov_fmu.io.messages import FileError
-from rov_fmu.study.run.system import read_system
+from rov_fmu.study.system import read_system
 from tests.commands import without_progress
 from tests.often import spread
 

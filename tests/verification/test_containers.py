@@ -10,8 +10,25 @@ import pytest
 
 from rov_fmu import Results, run_study
 from tests.folders import beside
-from tests.study.test_kinds import PLAN
 from verification.interoperability.importers import HERE, IMPORTERS
+
+PLAN = """stop_time = 4.0
+step = 0.1
+runs = 24
+seed = 3
+[inputs]
+u_l.ramps = [[0.0, 0.0], [1.0, 0.5], [2.0, 0.5], [2.0, -0.2]]
+u_r = 0.3
+[vary]
+alpha_u.normal = { mean = 1.1, sd = 0.1 }
+m_rov.uniform = [6.0, 7.0]
+V_N.values = [0.0, 0.2]
+[figures]
+final_x = "final(x)"
+drift = "mean(out['der(x)'])"
+[keep]
+outputs = ["u", "psi"]
+"""
 
 
 def _done(fmu: Path, folder: Path) -> Results:

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
-from typing_extensions import Self
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from rov_fmu.io.file_kinds import PLAN, check_suffix
 from rov_fmu.io.messages import FileError, lines_on
@@ -24,12 +23,15 @@ from rov_fmu.io.toml_file import (
     read_checked,
     rule,
 )
-from rov_fmu.study.plan.figures import read_expression
+from rov_fmu.study.figures import read_expression
 
 RUN, STATUS, REASON = "run", "status", "reason"
 """The columns that the results of every study have."""
 TRAJECTORY, TIME = "trajectory", "t"
 """The column of the trajectories, and the part of it with their times."""
+DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
+"""The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
+RUNS, STUDY = "runs", "study.json"
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
@@ -156,12 +158,6 @@ class InputSignal(Strict):
         """The points of either kind."""
         return self.steps or self.ramps or ()
 
-    def value_given(self, n: int | None) -> Iterator[float | list[float]]:
-        """Yield what the plan has of a point: its time and value, or only the value of an input that is a number."""
-        if n is not None:
-            time, value = self.points[n]
-            yield value if time == _ALWAYS else [time, value]
-
     def jumps(self, before: float) -> Iterator[int]:
         """Yield the numbers of the points at which the value jumps; `before` is the value before the first point."""
         last: tuple[float, float] | None = None
@@ -181,7 +177,6 @@ class InputFile(Strict):
 
 
 _ONCE = rule("must name each variable once", lambda names: len({*names}) == len(names))
-_ASCENDING = rule("must be times in ascending order", lambda times: [*times] == sorted({*times}))
 
 
 class Keep(Strict):
@@ -191,14 +186,6 @@ class Keep(Strict):
     """Names of variables."""
     every: Positive | None = None
     """The time between kept points, s; a multiple of the step. The default is every step."""
-    at: Annotated[_List, _ASCENDING] | None = None
-    """The times of the kept points, s, in place of `every`."""
-
-    @model_validator(mode="after")
-    def _not_both(self) -> Self:
-        if self.every is not None and self.at is not None:
-            raise ValueError("must have either every or at")
-        return self
 
 
 def _expression(text: str) -> str:
@@ -230,12 +217,13 @@ class Plan(Strict):
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
     """The time that a run of an FMU may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
-    """The number of runs. A grid has one for each of its points. saltelli rounds it up to a multiple of (varied
-    variables + 2), where correlated ones count as one."""
+    """The number of runs. A grid has one for each of its points, and `samples` one for each row."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """The parameters of a run depend only on this and on the run's number."""
-    sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
-    """The method by which the values are drawn. Sobol indices need saltelli."""
+    sampler: Literal["grid", "sobol", "latin-hypercube", "random"] = "sobol"
+    """The method by which the values are drawn."""
+    samples: Beside | None = None
+    """A CSV file with a column for each varied variable and a row for each run, such as a design of SALib."""
     vary_from: Beside | None = None
     """A vehicle file or name. Its coefficients vary with their errors and correlations, except for those in [vary] and
     [set]."""
@@ -259,7 +247,7 @@ class Plan(Strict):
     def files(self) -> Iterator[str]:
         """The files that it names, from its folder; a vehicle that ships is none."""
         file = self.input_file and self.input_file.path
-        return (name for name in (self.fmu, self.vehicle, self.system, self.vary_from, file) if name)
+        return (name for name in (self.fmu, self.vehicle, self.system, self.vary_from, self.samples, file) if name)
 
     @property
     def steps(self) -> int:
@@ -291,22 +279,7 @@ class Plan(Strict):
         """The numbers of the communication points at which they are kept."""
         if self.keep is None:
             return ()
-        if self.keep.at:
-            return [n for time in self.keep.at if (n := self.step_at(time)) is not None]
         return range(0, self.steps + 1, round(self.keep.every / self.step) if self.keep.every else 1)
-
-    @property
-    def mark(self) -> dict[str, Any]:
-        """The part of the plan that the results depend on, as JSON values.
-
-        The number of runs is included only for a Latin hypercube. With other samplers, it does not change the values of
-        a run.
-        """
-        left_out = {"title", "fmu", "vehicle", "system", "vary_from", "time_limit", "input_file"}
-        if self.sampler != "latin-hypercube":
-            left_out.add("runs")
-        mark = self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=left_out)
-        return mark | {"vary": [[*pair] for pair in mark["vary"].items()]}  # their order matters
 
 
 def _whole(steps: float) -> bool:
@@ -332,17 +305,13 @@ def _contradictions(plan: Plan) -> Iterator[str]:
         )
     elif plan.steps > _MOST_STEPS:
         yield key_line("step", f"must divide a run into at most {_MOST_STEPS} steps", plan.step)
-    elif keep := plan.keep:
-        if keep.every is not None and plan.step_at(plan.start_time + keep.every) is None:
-            yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}, and within a run", keep.every)
-        if None in [plan.step_at(time) for time in keep.at or ()]:
-            rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
-            yield key_line("keep.at", rule, [*(keep.at or ())])
+    elif plan.keep and plan.keep.every and plan.step_at(plan.start_time + plan.keep.every) is None:
+        yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}, and within a run", plan.keep.every)
     if plan.sampler == "grid" and plan.runs is not None:
         yield key_line("runs", "a grid has one run for each point: leave this key out", plan.runs)
     if plan.sampler == "grid" and plan.points > _MOST_RUNS:
         yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {plan.points:.3g}")
-    if plan.sampler != "grid" and plan.runs is None:
+    if plan.sampler != "grid" and not plan.samples and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
         yield "must have [keep] or [figures]. Otherwise nothing of a run is stored"

@@ -1,9 +1,8 @@
 """The figures of a run: expressions over its outputs, and the functions of time that they may call."""
 
 import warnings
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from math import isfinite, isnan, nan
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,15 +10,12 @@ import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
 from rov_fmu.io.messages import RovError, brief, reason_of
-from rov_fmu.study.plan.expression import (
-    BY_NAME,
+from rov_fmu.study.expression import (
     CONSTANTS,
     FUNCTIONS,
     TIME,
     FigureExpression,
-    FigureFunction,
     elements,
-    unit_of_first,
 )
 
 Array = npt.NDArray[np.float64]
@@ -40,13 +36,13 @@ class Responses:
     def __init__(self, times: Array) -> None:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
-        self.functions = {
-            "V_ss": FigureFunction(self.steady, unit_of_first),
-            "Tau": FigureFunction(self.time_constant, "s"),
-            "overshoot": FigureFunction(self.overshoot, "1"),
-            "settling_time": FigureFunction(self.settling_time, "s"),
-            "at": FigureFunction(self.at, unit_of_first),
-            "final": FigureFunction(self.final, unit_of_first),
+        self.functions: dict[str, Callable[..., Any]] = {
+            "V_ss": self.steady,
+            "Tau": self.time_constant,
+            "overshoot": self.overshoot,
+            "settling_time": self.settling_time,
+            "at": self.at,
+            "final": self.final,
         }
         """The functions by their names in an expression."""
 
@@ -114,33 +110,16 @@ class Responses:
             raise ValueError("a time is NaN")
 
 
-def read_expression(
-    text: str, units: Mapping[str, str] = MappingProxyType({}), times: Array = _ANY_TIMES
-) -> FigureExpression:
-    """Read an expression over the times of a run. Raises ExpressionError with the reason.
-
-    `units` has those of the variables.
-
-    Examples:
-        read_expression("x[-1] - at(x, 10)", {"x": "m"}).unit  # "m"
-    """
-    return FigureExpression(text, {**FUNCTIONS, **Responses(times).functions}, units)
-
-
-def meaning(name: str) -> str:
-    """Return a hint about a name that an expression cannot use as a value, or an empty text."""
-    if name in {**FUNCTIONS, **Responses(_ANY_TIMES).functions}:
-        return f"{name} is a function: write {name}(...)"
-    if name == BY_NAME:
-        return f'{BY_NAME} gives a variable by its name: write {BY_NAME}["der(u)"]'
-    return ""
+def read_expression(text: str, times: Array = _ANY_TIMES) -> FigureExpression:
+    """Read an expression over the times of a run. Raises ExpressionError with the reason."""
+    return FigureExpression(text, {**FUNCTIONS, **Responses(times).functions})
 
 
 class Figures:
     """The figures of a plan, for one thread at a time. Raises ExpressionError."""
 
     def __init__(self, expressions: Mapping[str, str], times: Array) -> None:
-        self._expressions = {name: read_expression(text, times=times) for name, text in expressions.items()}
+        self._expressions = {name: read_expression(text, times) for name, text in expressions.items()}
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float | None], str]:
@@ -181,7 +160,7 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
 
     All values of the run are NaN here, so that a wrong type or a wrong time is found if it does not depend on them.
     """
-    expression = read_expression(text, times=times)
+    expression = read_expression(text, times)
     none = np.full(len(times), nan)
     values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, none), **dict.fromkeys(varied, nan)}
     with warnings.catch_warnings(), np.errstate(all="ignore"):

@@ -22,8 +22,8 @@ from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.reading import read_bytes
-from rov_fmu.study.plan.model import Model
-from rov_fmu.study.plan.study import Study
+from rov_fmu.study.model import Model
+from rov_fmu.study.study import Study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,9 +72,6 @@ def read_system(path: Path) -> SystemModel:
     return SystemModel(name=path.name, content=read_bytes(path), variables=variables, structure=structure)
 
 
-# ---- Its runs --------------------------------------------------------------------------------------------------------
-
-
 class SystemSimulator:
     """An unpacked system, in a process of its own, with new instances for each run."""
 
@@ -101,17 +98,17 @@ class SystemSimulator:
         return {name: np.array(own, has[name].dtype) for name, own in zip(self._study.recorded, columns, strict=True)}
 
 
-def half_step_words(study: Study, model: SystemModel, values: Sequence[float]) -> str:
-    """Return a line about what half the step changes in a run with some values; none if nothing is connected."""
+def half_step_words(study: Study, model: SystemModel) -> str:
+    """Return a line about what half the step changes in the first run; none if nothing is connected."""
     starts = dict.fromkeys(".".join(one.start) for one in model.structure.connections)
     if not (names := [name for name in starts if name in model.variables]):
         return ""
-    alike, limits = replace(study, recorded=names), budget(2.0 * study.plan.time_limit)
+    alike, limits = replace(study, recorded=names, rows=study.rows[:1]), budget(2.0 * study.plan.time_limit)
     with temporary_folder("system-") as folder:
         model.unpack(Path(folder))
         try:
             with closing(ChildProcess(SystemSimulator, folder, alike, model, limits=limits)) as child:
-                runs = [child.call("run", values, parts) for parts in (1, 2)]
+                runs = [child.call("run", study.rows[0].tolist(), parts) for parts in (1, 2)]
         except (ChildError, RunError) as error:
             who = f"{model.running(folder)} " if isinstance(error, ChildError) else ""
             return f"half the step was tried in one run, which cannot be done: {who}{error}"

@@ -3,8 +3,6 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from hashlib import sha256
 from io import BytesIO
 from math import inf
 from pathlib import Path
@@ -15,7 +13,6 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.fmus.fmu import Fmu
 from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.fmus.variable import Variable
-from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import did_you_mean, shown
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -33,11 +30,6 @@ class Model:
     vehicle: Vehicle | None = None
     """The vehicle that the engine runs without an FMU."""
 
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of the content."""
-        return sha256(self.content).hexdigest()
-
     def unpack(self, folder: Path) -> None:
         """Unpack the FMU into a folder. Raises FileError."""
         unpack_fmu(BytesIO(self.content), Path(self.name), folder)
@@ -51,14 +43,6 @@ def read_model(path: Path) -> Model:
     """Read an FMU. Raises FileError if it cannot be unpacked, or is not for Co-Simulation of FMI 2.0 or 3.0."""
     fmu = Fmu.open(path)
     return Model(path.name, fmu.content, {name: v for name, v in fmu.variables.items() if v.kind != "String"})
-
-
-def vehicle_fmu(vehicle: Vehicle) -> Model:
-    """Build the FMU of a vehicle for this machine, and read it. Raises BuildError."""
-    from rov_fmu.build import build_fmu
-
-    with temporary_folder("fmu-") as folder:
-        return read_model(build_fmu(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"]).path)
 
 
 def vehicle_model(vehicle: Vehicle) -> Model:
