@@ -111,19 +111,6 @@ def reference_results(vehicle: Vehicle, *, native: bool = True) -> dict[str, byt
     """
     proofs = [*map(_deep, (*_steps(vehicle), _manoeuvre(vehicle)))]
     variants = _at_ends_of_intervals(vehicle, proofs[-1])
-    files, related = expected_files(vehicle.name, proofs, _SECOND_SOLVER if native else _SAME_SOLVER, variants)
-    of_origin, roles = origin(vehicle)
-    return {**files, **of_origin, MANIFEST: manifest([*related, *roles, *documents(vehicle)])}
-
-
-def expected_files(
-    subject: str, proofs: Sequence[ExpectedRun], origin: str, variants: Sequence[ExpectedRun] = ()
-) -> tuple[dict[str, bytes], list[Related]]:
-    """Return the files of experiments by their path in the FMU, and as the manifest lists them.
-
-    `subject` is the name of what the FMU models, in the descriptions, and `origin` says where the expected results come
-    from. `variants` have no expected results.
-    """
     sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
     text = {
         f"{name}.ssv": render(
@@ -141,7 +128,7 @@ def expected_files(
         text[f"{one.name}_expected.csv"] = _csv(one.references(), one.compared)
         related.append(Related(f"{one.name}_expected.csv", "result", "text/csv", f"Expected: {one.description}"))
     for some, name, purpose, title, words in (
-        (proofs, "experiments", "validation", "Expected results", origin),
+        (proofs, "experiments", "validation", "Expected results", _SECOND_SOLVER if native else _SAME_SOLVER),
         (variants, "uncertainty", "uncertainty-analysis", "Ends of the 95 % intervals", _UNCERTAIN),
     ):
         if some:
@@ -152,10 +139,12 @@ def expected_files(
                 tolerance=f"{TOLERANCE:g}",
                 steps=_STEPS,
                 seconds=_text,
-                description=f"{subject}: {words}",
+                description=f"{vehicle.name}: {words}",
             )
             related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
-    return {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}, related
+    of_origin, roles = origin(vehicle)
+    files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
+    return {**files, **of_origin, MANIFEST: manifest([*related, *roles, *documents(vehicle)])}
 
 
 _SECOND_SOLVER = (

@@ -6,7 +6,6 @@ from math import inf
 from typing import Any
 
 _TYPES = {"Real": "f8", "Integer": "i4", "Boolean": "i4", "String": "O"}
-_REAL = ("Real", "Float64", "Float32")
 _TYPES_OF_3 = {
     **{name: name.lower() for name in ("Float32", "Float64")},
     **{f"{u}Int{bits}": f"{u}int{bits}".lower() for u in ("", "U") for bits in (8, 16, 32, 64)},
@@ -40,8 +39,6 @@ class Variable:
     """The nominal value, or 0 if the FMU gives none."""
     dtype: str = "f8"
     """The NumPy name of its type."""
-    is_sampled: bool = False
-    """True if it is a real number that changes only at communication points (variability discrete)."""
 
     @property
     def is_whole(self) -> bool:
@@ -114,7 +111,6 @@ def _variable(v: Any, kind: str, dtype: str) -> Variable:
         v.description or "",
         float(nominal or 0.0),
         dtype,
-        kind in _REAL and v.variability == "discrete",
     )
 
 

@@ -64,7 +64,6 @@ def vehicle_model(vehicle: Vehicle) -> Model:
             v.start or 0.0,
             v.description,
             v.nominal or 0.0,
-            is_sampled=v.variability == "discrete",
         )
         for v in variables(vehicle)
     }

@@ -11,13 +11,12 @@ from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
 from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
-from rov_fmu.bridges.autopilot.expected import expected_of_autopilot
 from rov_fmu.build import chosen_platforms, with_binaries
 from rov_fmu.c.compile import compile_all
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
 from rov_fmu.equation.layout import Layout
-from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.archive import CARD, archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
 from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
@@ -156,7 +155,7 @@ def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, 
     """
     chosen = chosen_platforms(platforms, fmi)
     model = autopilot_model(autopilot)
-    expected = expected_of_autopilot(autopilot, model)
-    content = native_content(model, expected, fmi=fmi, interface="cs", platforms=chosen)
+    card = {CARD: model.card.encode()}
+    content = native_content(model, card, fmi=fmi, interface="cs", platforms=chosen)
     files = with_binaries(content, compile_all(chosen, content.sources, content.identifier, fmi=fmi), fmi)
     return archive(files)
