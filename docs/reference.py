@@ -290,9 +290,9 @@ def _first_sentence(words: str) -> str:
 
 
 def _equations(name: str) -> str:
-    """The equations of a vehicle that ships, a line each; the number of the paper's equation behind."""
-    lines = [(str(line), line.reference) for line in equations.equations_of(load_vehicle(SHIPPED[name]).layout)]
-    return "\n".join(f"{line:<96} {reference}".rstrip() for line, reference in lines)
+    """The forces and the thrust of a vehicle that ships, a line each."""
+    rows = equations.equations_of(load_vehicle(SHIPPED[name]).layout)
+    return "\n".join(f"{of:<14} {what:<52} {formula}" for of, what, formula in rows if "z±" not in formula and "_out" not in formula)
 
 
 def _terminals() -> Table:

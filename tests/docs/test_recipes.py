@@ -157,7 +157,7 @@ found = {
     "F_t": rov.calculated(inputs, state)["F_t"],
     "description": content["modelDescription.xml"].decode(),
     "equation": content["sources/equation.h"].decode(),
-    "page": str(equations_of(rov.layout)),
+    "page": str([*equations_of(rov.layout)]),
     "arrays": float(rates[[*rov.layout.state].index("w")]),
     "w": rov.derivatives(inputs, state)["w"],
     "gazebo": sdf.gazebo_model(rov).notes,

@@ -22,8 +22,7 @@ from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.content import REPORT
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
-from rov_fmu.io.messages import listed
-from rov_fmu.report.page import equations
+from rov_fmu.report.page.equations import equations_of
 from rov_fmu.report.page.live import FlyingVehicle, live
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.drawing import draw_thrusters
@@ -95,11 +94,7 @@ def documentation_page(
         + [*layout.initial],
         card=card(vehicle),
         speeds=[*speed_table(vehicle)],
-        coupled=listed(equations.coupled(layout)),
-        equations=equations.equations_of(layout),
-        mathml=equations.mathml,
-        parts=equations.parts_in_mathml,
-        choices=equations.choices,
+        equations=[*equations_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         live=live([FlyingVehicle(vehicle, module)]) if module and layout.actuators else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
