@@ -9,7 +9,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
+from rov_fmu.identify.likelihood.curves import QUADRATIC_DRAG, Drags, Motions
 from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
@@ -83,7 +83,7 @@ def commands_of_answers(tested: Tested) -> list[float]:
 
 def _responses_of(
     vehicle: Vehicle,
-    shapes: Shapes,
+    shapes: Drags,
     axis: Axis,
     commands: Sequence[float],
     pushes: Sequence[float] = (),
@@ -161,7 +161,7 @@ def answers(
     """
     curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
     with_lag = not pushes and any(curve.has_lag for curve in curves)
-    of_file = _responses_of(vehicle, NO_SHAPES, axis, commands, pushes, with_lag=with_lag)
+    of_file = _responses_of(vehicle, QUADRATIC_DRAG, axis, commands, pushes, with_lag=with_lag)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
     beyond, ends = beyond_tests(pushes or commands, tested) ** 2, list[Array]()
@@ -195,7 +195,7 @@ def push_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> Callable[[fl
         return None
 
     def push(vehicle: Vehicle, command: float) -> float:
-        at_rest, pushed = NO_SHAPES.motions(vehicle, axis, np.array([0.0, command])).of["C"].tolist()
+        at_rest, pushed = QUADRATIC_DRAG.motions(vehicle, axis, np.array([0.0, command])).of["C"].tolist()
         return float(pushed - at_rest)
 
     return lambda command: push(own, command) / push(wrench, 1.0)
@@ -222,7 +222,7 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
     rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
-    responses = _responses_of(rovs, NO_SHAPES, axis, COMMANDS).reshape(len(COMMANDS), 3, -1)
+    responses = _responses_of(rovs, QUADRATIC_DRAG, axis, COMMANDS).reshape(len(COMMANDS), 3, -1)
     values = responses[..., 0]
     low, high = values, values
     if known.names:

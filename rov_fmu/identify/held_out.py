@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.identify.assess import logarithms
 from rov_fmu.identify.beginning import table_rows
 from rov_fmu.identify.given import Tests
-from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.curves import QUADRATIC_DRAG
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import DataPart, Objective, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
@@ -250,7 +250,7 @@ def points_of(tests: Tests, values: Values, vehicle: Vehicle) -> Iterator[Measur
         subject = row.subject.name
         unit = {"force": "N", "Tau": "s"}.get(row.quantity) or AXES[subject].unit
         out = values.get((row.quantity, subject, row.command), np.nan)
-        numbers = row.command, row.measured, float(modelled([row], vehicle, NO_SHAPES)[0]), out
+        numbers = row.command, row.measured, float(modelled([row], vehicle, QUADRATIC_DRAG)[0]), out
         yield MeasuredPoint(subject, row.quantity, unit, file, *numbers, counts)  # type: ignore[arg-type]
 
 

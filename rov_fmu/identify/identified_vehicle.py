@@ -4,7 +4,6 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
 from math import inf, isclose
 from os.path import commonpath
 from pathlib import Path
@@ -17,7 +16,7 @@ from rov_fmu.equation.catalogue import COUPLED_AXES, HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import EVERY_COMMAND, Curve, Part, Range
 from rov_fmu.identify.given import Tests
-from rov_fmu.identify.likelihood.curves import Quadratic, nearest
+from rov_fmu.identify.likelihood.curves import Quadratic
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND, OWN_KEYS
 from rov_fmu.identify.likelihood.objective import changed
@@ -233,19 +232,9 @@ _SOURCE = "Identified from the tests, as the method says"
 def _in_file(posterior: Posterior, fit: Fit, z: Array) -> dict[str, Any]:
     """Return the coefficients of a vehicle file for the coordinates of the parameters."""
     coefficients = posterior.table.coefficients(z)
-    for quadratic in (*_quadratics(posterior, fit, z), *posterior.table.nearest_drags(z, fit.speeds)):
+    for quadratic in posterior.table.nearest_drags(z, fit.speeds):
         coefficients |= quadratic.coefficients
     return coefficients | {name: posterior.table.base[name] for name in posterior.table.exact}
-
-
-def _quadratics(posterior: Posterior, fit: Fit, z: Array) -> Iterator[Quadratic]:
-    """Yield the curves of a file for those that bend. A file has no shapes of curves: it has the nearest ones."""
-    low, high = fit.command_range
-    vehicle, shapes = posterior.table.model(z)
-    for curve in fit.known.curves:
-        if curve.name in shapes.of and shapes.of[curve.name].any():
-            bands = shapes.dead_bands[curve.name]
-            yield from nearest(curve, partial(shapes.forces, vehicle, curve), bands, low, high)
 
 
 def _changed(posterior: Posterior, vehicle: Vehicle) -> list[str]:
@@ -274,16 +263,13 @@ class _Numbers:
 def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
     """Return some coefficients of a vehicle file.
 
-    The forces of a measured curve that bends differ from those of the file by a misfit, which is uncertain, too. The
-    covariance of a_t and b_t contains it: the mean variance of the forces grows by the mean square of the misfit. The
-    scale of the forces of other curves is an assumption, whose error is much larger than their misfit. The
-    covariance of a_d and b_d contains the misfit of drag with another power in the same way.
+    Drag with another power differs from that of the file by a misfit, which is uncertain, too. The covariance of a_d
+    and b_d contains it: the mean variance of the drag grows by the mean square of the misfit.
     """
 
     def measured(z: Array) -> list[Quadratic]:
-        some = [one for one in _quadratics(posterior, fit, z) if one.of in fit.known.measured_curves]
-        some += posterior.table.nearest_drags(z, fit.speeds)
-        return [one for one in some if {*one.coefficients} <= {*names}]
+        drags = posterior.table.nearest_drags(z, fit.speeds)
+        return [one for one in drags if {*one.coefficients} <= {*names}]
 
     def values(z: Array) -> Array:
         coefficients, misfits = _in_file(posterior, fit, z), [one.misfit for one in measured(z)]

@@ -22,17 +22,13 @@ from rov_fmu.tank.catalogue import MeasuredQuantity
 OnAnswer = Callable[[str, str], None]
 """A function that is called with the name of an axis, and with what is known about it so far."""
 
-SPLINE = "shape of the thrust", "quadratic thrust"
-"""The stages that only a measured curve has."""
 HYPOTHESES, REFINED = "hypotheses", "exact derivatives"
 _STAGES = {
     "start 1": (0.20, 12.0),
     "start 2": (0.04, 8.0),
     "all samples": (0.12, 4.0),
     HYPOTHESES: (0.30, 2.5),
-    SPLINE[0]: (0.06, 3.0),
     REFINED: (0.09, 1.0),
-    SPLINE[1]: (0.06, 6.0),
     "predicting what was left out": (0.15, 6.0),
     "what to measure next": (0.015, 2.0),
 }

@@ -63,14 +63,9 @@ def test_the_file_is_a_minimum_without_the_weakest_effects(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", spread(("pool", "tadpole", "harbour", "otter"), ["tadpole"], ["pool"]))
 def test_what_is_told_is_the_vehicle_of_the_file_with_its_weak_effects(name: str) -> None:
-    """Only measured forces bend a curve: the shapes of others would explain noise, and ill thrusters."""
     tests = load_tests(HERE / "tank_tests" / name)
     fit = fit_all(*begin(tests))
     assert fit.file.minimum.value - least_without_evidence(fit) <= 2.0 + 2.0 * ENOUGH, "both end so near to a minimum"
-    parameters = fit.objective.table.parameters
-    shapes = [n for n, p in enumerate(parameters) if p.kind == "thrust shape" and p.of not in fit.known.measured_curves]
-    assert not fit.best.z[shapes].any()
-    assert not fit.posterior.errors[shapes].any()
 
 
 @pytest.mark.parametrize(

@@ -1,20 +1,12 @@
-"""The shape of thrust curves, and the motion of one axis with it.
+"""The steady thrust of curves, and the motion of one axis alone."""
 
-A curve is a scale times a shape. The shape may deviate smoothly from that of the prior curve: a command c beyond the
-dead band d acts like the command d + (c - d) (1 + eta(c)) of the prior curve with this dead band. eta is a natural
-cubic spline, constant below its first knot, and 0 at full command, which the scale describes. (Lines between the knots
-would be off by 1 % of the thrust for published curves.) eta has a Gaussian prior with a correlation length, and the
-deviations ahead and astern are correlated by one half.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import lru_cache
 from math import inf
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, stopping_formula
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
@@ -26,118 +18,39 @@ from rov_fmu.equation.thrust import curve_formulas
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
-KNOTS = (0.1, 0.25, 0.45, 0.7)
-"""The commands at which eta is a parameter."""
-_LENGTH = 0.3
-"""The correlation length of the deviations, in commands."""
-_POWER = 1.5
-"""Thrust grows about with this power of the command: a deviation of the force is as many times that of the command."""
-_ROUNDING = 1e-12
-"""One of a_t and b_t is 0 where it is so small relative to the other one."""
-_WEAKEST = 0.1
-"""The least of 1 + eta: beyond the dead band there is always some thrust."""
-COUNT = 2 * len(KNOTS)
 _LEAST_SPEED = 0.15
 """The speed, relative to the largest tested one, from which on drag has the nearest linear and quadratic terms."""
 
 
-@cache
-def _root() -> Array:
-    """Return the root of the correlation of eta at the knots ahead and then astern, given that it is 0 at 1."""
-    c = np.array([*KNOTS, 1.0])
-    K = np.exp(-0.5 * ((c[:, None] - c) / _LENGTH) ** 2)
-    conditional = K[:-1, :-1] - np.outer(K[:-1, -1], K[-1, :-1])
-    both = np.kron([[1.0, 0.5], [0.5, 1.0]], conditional)
-    return np.asarray(np.linalg.cholesky(both + 1e-9 * np.eye(COUNT)), np.float64)
-
-
-@cache
-def _spline() -> CubicSpline:
-    """Return the spline whose values are the weights of eta at the knots."""
-    return CubicSpline([*KNOTS, 1.0], np.eye(len(KNOTS) + 1)[:, :-1], bc_type="natural")
-
-
-def _weights(commands: Array) -> Array:
-    """Return the derivatives of eta at some commands with respect to the coordinates of a curve: ... x COUNT."""
-    own, is_astern = _spline()(np.maximum(np.abs(commands), KNOTS[0])), (commands < 0.0)[..., None]
-    knots = np.concatenate([np.where(is_astern, 0.0, own), np.where(is_astern, own, 0.0)], axis=-1)
-    return knots @ _root() / _POWER
-
-
 @dataclass(frozen=True, eq=False)
-class Shapes:
-    """The deviations of the shapes of some curves."""
+class Drags:
+    """The powers of the drag along the axes."""
 
-    of: Mapping[str, Array]
-    """By curve: COUNT independent coordinates times the relative deviation of the force."""
-    dead_bands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """By curve: the commands at which thrust begins, ahead and astern; 0 where there is none."""
-    exact_astern: frozenset[str] = frozenset()
-    """The curves that do not deviate astern."""
     powers: Mapping[str, tuple[Any, Any, float]] = field(default_factory=dict)
     """By axis: q ahead and astern, and V, of the drag a |v| v |v/V|^q in place of the quadratic one."""
-
-    def commands(self, curve: str, commands: Array) -> Array:
-        """Return the commands of the prior curve that act like some commands of a curve: m, or m x n for n vehicles.
-
-        The commands are m, or m x n if each vehicle has its own.
-        """
-        if curve not in self.of or not self.of[curve].any():
-            return commands
-        coordinates, weights = self.of[curve], _weights(commands)
-        eta = weights @ coordinates if commands.ndim == 1 else (weights * coordinates.T).sum(axis=-1)
-        c = commands.reshape(*commands.shape, *[1] * (coordinates.ndim - commands.ndim))
-        size, is_astern = np.abs(c), c < 0.0
-        if curve in self.exact_astern:
-            eta = np.where(is_astern, 0.0, eta)
-        band = np.where(is_astern, *reversed(self.dead_bands.get(curve, (0.0, 0.0))))
-        bent = np.maximum(eta, _WEAKEST - 1.0) * np.maximum(size - band, 0.0)
-        return np.asarray(np.sign(c) * np.clip(size + bent, 0.0, 1.0))
-
-    def inputs(self, layout: Layout, inputs: Array) -> Array:
-        """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'.
-
-        For n vehicles, these are n x rows x inputs.
-        """
-        if not any(coordinates.any() for coordinates in self.of.values()):
-            return inputs
-        names, changed = [*layout.inputs], dict[int, Array]()
-        for name, curve in layout.curve_of.items():
-            index = names.index(f"u_{name}")
-            changed[index] = self.commands(curve.name, inputs[..., index].T).T
-        sets = np.broadcast_shapes(*(some.shape[:-1] for some in changed.values()))
-        rows = np.empty((*sets, *inputs.shape[-2:]))
-        rows[...] = inputs
-        for index, commands in changed.items():
-            rows[..., index] = commands
-        return rows
-
-    def forces(self, vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
-        """Return the steady thrust of all thrusters that a curve describes together, for m commands, N.
-
-        It is m x n if the coefficients of the vehicle are arrays of n values.
-        """
-        values: dict[str, Any] = {**vehicle.coefficients, **vehicle.layout.usual_inputs}
-        values["u_one"] = _column(self.commands(curve.name, commands), vehicle)
-        *_, force = _thrust_of(curve)(values).values()
-        return np.asarray(curve.n_thrusters * force)
 
     def motions(self, vehicle: Vehicle, axis: Axis, commands: Array) -> "Motions":
         """Return the equation of an axis alone under each of m held commands, once the thrust is steady."""
         layout = vehicle.layout
         inputs: dict[str, Any] = dict(layout.usual_inputs)
         driving = [layout.commands_along(axis, command) for command in commands.tolist()]
-        for name in driving[0]:
-            acting = np.array([of_command[name] for of_command in driving])
-            if curve := layout.curve_of.get(name.removeprefix("u_")):
-                acting = self.commands(curve.name, acting)
-            inputs[name] = _column(acting, vehicle)
+        inputs |= {name: _column(np.array([one[name] for one in driving]), vehicle) for name in driving[0]}
         if layout.has_dead_time:
             inputs |= {delayed_name(name): inputs[name] for name in layout.commands}
         numbers = _alone_of(layout, axis)({**vehicle.coefficients, **inputs})
         shape = np.broadcast_shapes(np.shape(_column(commands, vehicle)), *map(np.shape, vehicle.coefficients.values()))
         of = {key: np.broadcast_to(numbers[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")}
         return Motions(of, *self.powers.get(axis.name, ()))
+
+
+def forces(vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
+    """Return the steady thrust of all thrusters that a curve describes together, for m commands, N.
+
+    It is m x n if the coefficients of the vehicle are arrays of n values.
+    """
+    values: dict[str, Any] = {**vehicle.coefficients, **vehicle.layout.usual_inputs}
+    *_, force = _thrust_of(curve)(values | {"u_one": _column(commands, vehicle)}).values()
+    return np.asarray(curve.n_thrusters * force)
 
 
 def _column(commands: Array, vehicle: Vehicle) -> Array:
@@ -166,7 +79,7 @@ def _alone_of(layout: Layout, axis: Axis) -> Callable[[Mapping[str, Any]], dict[
     return compiled(formulas, _tables(equation.tables.values()), ARRAYS)
 
 
-NO_SHAPES = Shapes({})
+QUADRATIC_DRAG = Drags()
 _SLOWEST = 1e-12
 """A lower speed has the factor |v/V|^q of this one, m/s or rad/s."""
 _NODES = np.polynomial.legendre.leggauss(24)
@@ -330,27 +243,6 @@ class Quadratic:
         """Return the covariance of both with which the relative forces at the commands have a mean variance."""
         terms = self.terms.reshape(-1, self.terms.shape[-1])
         return np.asarray(variance / len(self.coefficients) * np.linalg.inv(terms.T @ terms / len(terms)))
-
-
-def nearest(
-    curve: Curve, forces: Callable[[Array], Array], dead_bands: tuple[Any, Any], low: float, high: float
-) -> Iterator[Quadratic]:
-    """Yield the quadratic curves that are nearest to a curve ahead and astern.
-
-    `forces` gives the thrust for some commands (N); the relative errors have equal weights over low to high.
-    """
-    for end, sign, c_0 in (("", 1.0, dead_bands[0]), (REVERSE, -1.0, dead_bands[1])):
-        if f"a_t{end}" not in curve.keys:
-            continue
-        least = np.maximum(low, c_0 + 0.05)
-        commands = np.linspace(least, np.maximum(high, least + 0.1), 40)
-        F = (sign * forces(sign * commands)).T
-        beyond = (commands - c_0).T
-        terms = np.stack([beyond**2, beyond], axis=-1) / F[..., None]
-        values = np.linalg.pinv(terms).sum(axis=-1).T  # least squares of terms @ values = 1
-        values[np.abs(values) < _ROUNDING * np.abs(values).max(axis=0)] = 0.0
-        names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
-        yield Quadratic(curve.name, dict(zip(names, values, strict=True)), terms)
 
 
 def nearest_drag(axis: str, drag: Mapping[str, Any], power: Any, typical: float, top: float) -> Quadratic:

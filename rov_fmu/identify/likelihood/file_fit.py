@@ -1,8 +1,8 @@
 """The fit of the vehicle file, which says less than the model of the fit to all data.
 
-A file has no shapes of thrust curves, and effects that the data hardly show are left out. Both are fits again: J is
-minimised with quadratic curves, and then without the weakest effects while it rises by at most MOST_RISE in total. So
-the file has the numbers of a minimum of J, and not those of another vehicle that is extrapolated from it.
+Effects that the data hardly show are left out: J is minimised without the weakest ones while it rises by at most
+MOST_RISE in total. So the file has the numbers of a minimum of J, and not those of another vehicle that is extrapolated
+from it.
 """
 
 from collections.abc import Collection, Iterator

@@ -29,7 +29,6 @@ from rov_fmu.identify.likelihood.search import (
 )
 from rov_fmu.identify.likelihood.solve import (
     MOST_STEPS,
-    QUICK,
     Minimum,
     evidence,
     least_from,
@@ -38,8 +37,8 @@ from rov_fmu.identify.likelihood.solve import (
     scaled,
     start_of,
 )
-from rov_fmu.identify.progress import HYPOTHESES, REFINED, SPLINE, ProgressReport
-from rov_fmu.identify.result import ALARM, KEPT
+from rov_fmu.identify.progress import HYPOTHESES, REFINED, ProgressReport
+from rov_fmu.identify.result import ALARM
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 
@@ -62,10 +61,9 @@ class Fit:
     """The objective at its minimum: what is told, predicted and, without weak effects, written."""
 
     objective: Objective
-    """A curve is quadratic, as in the file, unless measured forces and the logs show that it bends."""
     best: Minimum
     posterior: Posterior
-    """With all effects, also those without evidence, and with the shapes of the curves that bend."""
+    """With all effects, also those without evidence."""
     file: FileFit
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
@@ -128,9 +126,6 @@ def fit_all(
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
-    A curve is quadratic, as in the vehicle file, unless its forces were measured and all data make it more probable
-    that it bends. An assumed curve never bends: its shape would explain what a weak or reversed thruster does.
-
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
     the reason, and not the structure. Such a fit is not refined, because nobody should use it. Neither is a fit that is
     clearly wrong along all axes: after _PATIENCE, the search for its cause ends with the round.
@@ -141,21 +136,10 @@ def fit_all(
     score = evidence(quick, ends[0])
     start = StructureFit({}, quick, ends[0], score, score)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
-    work.leave_out(*((HYPOTHESES, REFINED, *SPLINE) if is_mistake else ()))
+    work.leave_out(*((HYPOTHESES, REFINED) if is_mistake else ()))
     search, first, now = _searched_for_structure(start, full, work, is_mistake=is_mistake)
     full, near, is_wrong = now.objective, now.minimum, is_mistake or search.now.is_hopeless
     before = windows(search.plain.objective, search.plain.minimum.z)
-    measured = full.table.known.measured_curves
-    for curve in () if is_wrong else measured:
-        other, needed = _bending(full, full.table.known.bent | {curve}), evidence(full, near) + KEPT
-
-        def bends(end: Minimum, _: float = 0.0, other: Objective = other, needed: float = needed) -> bool:
-            return evidence(other, end) > needed
-
-        show = work.steps("shape of the thrust", f"the shape of the thrust of {curve}")
-        found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
-        if bends(found):
-            full, near = other, minimise(other, found.z, last=False)
     best = near
     if not is_wrong:
         # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
@@ -170,16 +154,12 @@ def fit_all(
     odds = {**first, **search.odds}
     if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
-    file = full, best
-    if full.table.known.bent:
-        other, show = _bending(full, frozenset()), work.steps("quadratic thrust")
-        file = other, minimise(other, best.z, show, near=best.data, enough=QUICK)
     misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best)))
     ratios = {axis: one.widens for axis, one in misfits.items()}
     unseen = unseen_errors(full, best.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)
     # Time constants of tables contain the lag, so that tables alone need none.
-    of_file = without_weak_effects(*file, posterior.lasting if logs else (), refines=not is_wrong)
+    of_file = without_weak_effects(full, best, posterior.lasting if logs else (), refines=not is_wrong)
     return Fit(
         full,
         best,
@@ -234,17 +214,11 @@ def _searched_for_structure(
     return search, first, search.now
 
 
-def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
-    """Return J where only some curves bend."""
-    return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
-
-
 def _from_starts(quick: Objective, work: ProgressReport) -> list[Minimum]:
     """Return the minima of J of thinned logs from two starts, the least first, or from one if that is enough.
 
     Where the first one leaves the model wrong along all axes, the second one counts only if it becomes lower.
     """
-    work.leave_out(*(() if quick.table.known.measured_curves else SPLINE))
     ends: list[Minimum] = []
     than = np.inf
     for n, words in enumerate(_STARTS):

@@ -268,7 +268,6 @@ KINDS = {
         force_power=1.0,
         adapts=True,
     ),
-    "thrust shape": Kind(_SHAPE),
     "linear thrust": Kind(_SHAPE),
     "reverse thrust": _astern(
         Deviation(

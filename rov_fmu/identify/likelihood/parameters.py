@@ -13,7 +13,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Part
-from rov_fmu.identify.likelihood.curves import COUNT, Quadratic, Shapes, nearest_drag
+from rov_fmu.identify.likelihood.curves import Drags, Quadratic, nearest_drag
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.kinds import (
     ABSENT,
@@ -261,24 +261,13 @@ class Table:
         """
         return self.full.get(axis.name, 1.0) * self.get(z, INERTIA, axis.name, default=1.0)
 
-    def model(self, z: Array) -> tuple[Vehicle, Shapes]:
-        """Return the vehicle, and the deviations of the shapes of its curves. No lag is shorter than the least one."""
+    def model(self, z: Array) -> tuple[Vehicle, Drags]:
+        """Return the vehicle, and the powers of its drag. No lag is shorter than the least one."""
         coefficients = self.coefficients(z)
         lags = (curve.coefficient("T") for curve in self.layout.curves if "T" in curve.keys)
         coefficients |= {name: np.maximum(coefficients[name], LEAST_LAG) for name in lags}
-        return Vehicle(self.layout, coefficients), self._shapes(z, coefficients)
-
-    def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
-        deviations, bands = {}, {}
-        for curve in self.layout.curves:
-            is_exact = {curve.coefficient("a_t"), curve.coefficient("b_t")} <= self.exact
-            if (first := self.index("thrust shape", self._shared(curve.name), "1")) is not None and not is_exact:
-                deviations[curve.name] = self.parameters[first].number(z[first : first + COUNT])
-                ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
-                bands[curve.name] = (ahead, astern)
-        reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
         powers = {axis.name: self.powers(z, axis) for axis in self.layout.bare_axes}
-        return Shapes(deviations, bands, frozenset(reverse), powers)
+        return Vehicle(self.layout, coefficients), Drags(powers)
 
     def powers(self, z: Array, axis: Axis) -> tuple[Any, Any, float]:
         """Return q ahead and astern, and V, of the drag a |v| v |v/V|^q along an axis. V does not change with z.
@@ -328,7 +317,6 @@ class Table:
         """Return the sets of parameters of the filter for a log."""
         file, layout = sampled.file, sampled.layout
         coefficients = self.coefficients(z)
-        shapes = self._shapes(z, coefficients)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             coefficients[name] = self.get(z, "current", file, part)
         axes = layout.bare_axes
@@ -372,7 +360,7 @@ class Table:
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
             width=self.get(z, WIDTH, file),
             powers=tuple(powers),
-            inputs=shapes.inputs(layout, self.followed(z, sampled)),
+            inputs=self.followed(z, sampled),
             count=1 if z.ndim == 1 else z.shape[1],
         )
 
@@ -529,20 +517,9 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
-            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0, factor=shape) for n in range(COUNT)]
-            linear = [
-                make(
-                    "linear thrust",
-                    name,
-                    "astern" if end else "",
-                    low=_least_linear(curve, known.coefficients, end),
-                    deviation=_LINEAR if is_measured else None,
-                )
-                for end in (("", REVERSE) if is_told_astern else ("",))
-            ]
-            bends = name in known.bent
-            yield from shapes if bends else map(_fixed, shapes)
-            yield from map(_fixed, linear) if bends else linear
+            for end in ("", REVERSE) if is_told_astern else ("",):
+                low, width = _least_linear(curve, known.coefficients, end), _LINEAR if is_measured else None
+                yield make("linear thrust", name, "astern" if end else "", low=low, deviation=width)
         if has_reverse:
             # Forces that were measured astern are data, and not an effect that may be absent.
             null = {"null": None} if is_told_astern else {}

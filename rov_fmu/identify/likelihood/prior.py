@@ -43,5 +43,3 @@ class Prior:
     own_curves: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """The curves of single thrusters: the curve that each was before, and the thruster. The thrust astern and the dead
     bands differ, and all else is shared."""
-    bent: frozenset[str] = frozenset()
-    """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""

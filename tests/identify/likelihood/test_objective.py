@@ -34,7 +34,6 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     for n, axis in enumerate((HEAVE, YAW, YAW)):
         write_log(path, str(n), run(VIDEORAY, axis, PLAN, 5.0).noisy(random))
     known, logs, rows = begin(load_tests(path))
-    known = replace(known, bent=frozenset({"rear"}))
     return Objective.of_known(known, logs, rows)
 
 
