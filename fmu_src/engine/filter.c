@@ -57,7 +57,6 @@ enum {
 };
 
 static const double TURN = 6.283185307179586;
-static const double INSTANT = 1e-9;   /* s: rounding of times */
 static const double MARGIN = 0.005;   /* s: how near to a step a change of a command matters */
 static const double TINY = 1e-60;
 static const double OUTLYING = 3.0; /* standard deviations: a larger innovation corrects the states as if it were no larger (Huber) */
@@ -93,7 +92,6 @@ typedef struct {
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
-    const double *averaged; /* of each sample: the time from which it is the mean; NULL if samples are of a moment */
     double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
     double share;                /* the longest step relative to the fastest time constant */
 } record;
@@ -169,7 +167,6 @@ typedef struct {
     int listed[N_X], count;
     belief now, ahead; /* after all samples so far, and the prediction */
     ptrdiff_t row, tilt;
-    ptrdiff_t next[MOST_SENSORS]; /* the next sample of each sensor, or the last one */
     real reset;                /* the last row at which the lateness began anew */
     mask beside[MOST_SENSORS]; /* if the last sample of a sensor was far beside its prediction */
     real cf, sf, ct, st;       /* cosines and sines of the measured roll and pitch at the time of the step or sample */
@@ -596,19 +593,13 @@ static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, 
 }
 
 /* How what a sensor with a lag measures follows from what it would measure at once, which is linear in time over a span of h: it is
- * `remains` of what it was, and shares of the values at the beginning and at the end. A lag of 0 gives the value at the end, and so
- * does a time before the interval of a mean. */
+ * `remains` of what it was, and shares of the values at the beginning and at the end. A lag of 0 gives the value at the end. */
 typedef struct {
     real remains, begin, end;
 } lagging;
 
-static lagging lagging_over(const filter *f, ptrdiff_t sensor, double begin, double h)
+static lagging lagging_over(const filter *f, ptrdiff_t sensor, double h)
 {
-    if (f->log->averaged) { /* the lag is the time since the interval of the next mean began */
-        const double since = begin - f->log->averaged[f->next[sensor]];
-        const real share = h / ((since > 0.0 ? since : 0.0) + h), none = 0.0, whole = 1.0;
-        return since < -INSTANT ? (lagging){none, none, whole} : (lagging){1.0 - share, 0.5 * share, 0.5 * share};
-    }
     const real lag = fmax(f->set->lag[sensor], TINY), remains = exp(-h / lag), share = (1.0 - remains) * lag / h;
     return (lagging){remains, share - remains, 1.0 - share};
 }
@@ -962,7 +953,6 @@ static void add_growth(const filter *f, const real middle[N_X], ptrdiff_t row, r
 static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
 {
     const double h = (to - from) / pieces;
-    const int together = f->log->averaged ? 1 : TOGETHER; /* what remains of a mean differs from step to step */
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     ptrdiff_t row = f->row;
     real reset = f->reset, once[N_SLOW];
@@ -980,11 +970,11 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         while (row + 1 < f->log->rows && ALL(ends(f, row + 1) <= begin)) {
             row++;
         }
-        for (int a = vehicle; a < moving && (piece == 0 || f->log->averaged); a++) {
+        for (int a = vehicle; a < moving && piece == 0; a++) {
             const int sensor = f->listed[a] - LAGGED;
-            part[sensor] = lagging_over(f, sensor, begin, h);
-            halves[0][sensor] = lagging_over(f, sensor, begin, 0.5 * h);
-            halves[1][sensor] = lagging_over(f, sensor, begin + 0.5 * h, 0.5 * h);
+            part[sensor] = lagging_over(f, sensor, h);
+            halves[0][sensor] = lagging_over(f, sensor, 0.5 * h);
+            halves[1][sensor] = lagging_over(f, sensor, 0.5 * h);
         }
         set_tilt(f, 0.5 * (begin + end));
         mean_thrust(f, row, begin, end, held);
@@ -992,7 +982,7 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         if (!has_covariance) {
             continue;
         }
-        if (piece % together == 0) {
+        if (piece % TOGETHER == 0) {
             slopes(f, middle, held, &m->A);
             transition(f, &m->A, h, &m->once);
             transition_lagged(f, middle, part, once, &m->once, slope);
@@ -1006,8 +996,8 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             const mask begins_anew = begins(f, j) < end && reset < (double)j;
             if (f->log->anew[j] != 0 && ANY(begins_anew)) {
                 reset = begins_anew ? (double)j : reset;
-                d.newest = begins_anew ? (double)(1 + piece % together) : d.newest;
-                while (d.count < 2 + piece % together) {
+                d.newest = begins_anew ? (double)(1 + piece % TOGETHER) : d.newest;
+                while (d.count < 2 + piece % TOGETHER) {
                     memset(d.late[d.count++], 0, sizeof d.late[0]);
                 }
             }
@@ -1022,9 +1012,9 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             }
         }
         step_delays(f, &m->once, late, &d);
-        if (piece % together == together - 1 || piece == pieces - 1) {
+        if (piece % TOGETHER == TOGETHER - 1 || piece == pieces - 1) {
             memcpy(remains, once, sizeof remains);
-            step_covariance(f, b->P, 1 + piece % together, &d, remains, row);
+            step_covariance(f, b->P, 1 + piece % TOGETHER, &d, remains, row);
         }
     }
 }
@@ -1134,7 +1124,7 @@ static int pieces_over(const filter *f, double from, double to)
             fastest = fmax(fastest, f->listed[A->column[i][k]] == i ? fabs(A->entry[i][k]) / f->log->share : 0.0);
         }
     }
-    for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN && !f->log->averaged; j++) {
+    for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
         if (ends(f, j) > from - MARGIN && f->log->anew[j] != 0) {
             fastest = fmax(fastest, 1.0 / f->log->changing);
         }
@@ -1142,17 +1132,6 @@ static int pieces_over(const filter *f, double from, double to)
     return (int)fmin(fmax(ceil((to - from) * fastest - 1e-6), 1.0), 1e5);
 }
 #endif
-
-/* Find the first sample of a sensor of means from sample k on. After the last one, it stays this one. */
-static void find_next(filter *f, ptrdiff_t k, ptrdiff_t sensor)
-{
-    for (; f->log->averaged && k < f->log->samples; k++) {
-        if (f->log->sensor[k] == sensor) {
-            f->next[sensor] = k;
-            return;
-        }
-    }
-}
 
 /* Let each sensor with a lag begin with what it would measure at once. The error of this is the lag times a rate of change, whose
  * standard deviation is the `error` of its state. */
@@ -1212,9 +1191,6 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
             f->listed[f->count++] = i;
         }
     }
-    for (ptrdiff_t sensor = 0; sensor < log->sensors; sensor++) {
-        find_next(f, 0, sensor);
-    }
     pass_rows(f, log->time[0]);
     set_tilt(f, log->time[0]);
     begin_lagged(f);
@@ -1269,7 +1245,6 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
             }
         }
         take(f, &f->now, k, how->repeats, &off, &variance, gain);
-        find_next(f, k + 1, log->sensor[k]);
         if (predicts) {
             real PH[N_X];
             off = innovation(f, &f->ahead, k);

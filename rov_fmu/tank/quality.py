@@ -33,11 +33,6 @@ _FASTER = 5.0
 its median over three samples changes by half of the jump or more."""
 _AROUND_JUMP = np.array([[-2, -1, 0], [1, 2, 3]])
 """The three samples before and after a jump, from the sample before it."""
-_FASTER_VELOCITY = 2.0
-"""How many times as fast as 95 % of the time a velocity changes where it jumps, because thrusters change it quickly.
-Other quantities change _FASTER times as fast."""
-_AROUND = 5
-"""The acceleration around a sample is the median of so many, which follows one that begins at once."""
 
 
 def checked_log(log: Log) -> Log:
@@ -203,13 +198,12 @@ def _jumps(log: Log, resets: _Resets) -> Finding:
     return about(log.file, "jumps", name, quantity=quantity, jumps=words, count=len(resets.times))
 
 
-def jumps(time: Array, path: Array | Rotation, *, is_velocity: bool = False) -> Indices:
+def jumps(time: Array, path: Array | Rotation) -> Indices:
     """Return the indices of the samples after which a quantity jumps, as by a reset of a filter or of a sensor.
 
-    `path` is in m, rad or m/s, without jumps of a full turn, or it has attitudes. A velocity jumps by what differs from
-    the acceleration around it, which may be as large where a command changes.
+    `path` is in m, rad or m/s, without jumps of a full turn, or it has attitudes.
     """
-    from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
+    from scipy.ndimage import maximum_filter  # imported here because it is slow
 
     every = np.arange(len(time))
     steps = _steps(path, every[:-1], every[1:]) if len(time) else np.zeros((0, 1))
@@ -217,12 +211,8 @@ def jumps(time: Array, path: Array | Rotation, *, is_velocity: bool = False) -> 
         return np.zeros(0, np.intp)
     intervals = np.diff(time)
     sizes = np.linalg.norm(steps, axis=-1)
-    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(sizes / intervals, 0.95)
+    usual = _FASTER * np.quantile(sizes / intervals, 0.95)
     least = max(_LEAST_JUMP, _FASTER * float(np.median(sizes[sizes != 0.0])))
-    if is_velocity:
-        rates = steps[:, 0] / intervals
-        path = np.append(0.0, np.cumsum((rates - median_filter(rates, _AROUND, mode="nearest")) * intervals))
-        sizes = np.abs(np.diff(path))
     rates = sizes / intervals
     beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
     sudden: Indices = np.flatnonzero((sizes > least) & (rates > np.maximum(beside, usual)))

@@ -223,18 +223,6 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
-        "unsettled velocity",
-        quiet(structures=(Structure("unsettled velocity", "a.csv (until 33.7 s)", 0.98),)),
-        "a.csv (until 33.7 s): the measured velocity is not that of the vehicle before it jumps, as of an estimator",
-        quiet(),
-    ),
-    (
-        "means of rows",
-        quiet(structures=(Structure("means of rows", "a.csv", 0.98),)),
-        "a.csv: each row has the means of its interval (probability 98% among",
-        quiet(),
-    ),
-    (
         "rotor lag",
         quiet(structures=(Structure("rotor lag", "", 0.98),)),
         "the speed of the rotors lags behind",

@@ -95,8 +95,6 @@ class Record:
     beside: Array | None = None
     """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
     change along straight lines from row to row."""
-    averaged: Array | None = None
-    """n: the time from which each sample is the mean, s. None: all samples are values of a moment."""
     anew: Indices | None = None
     """m: 0 for a row that goes on with the change of the row before, and shares its delay. None: there is none."""
 
@@ -192,7 +190,7 @@ class _Record(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told", "anew")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
         *((name, ctypes.c_ssize_t) for name in ("tilts", "wanders")),
-        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside", "averaged")),
+        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
         *((name, ctypes.c_double) for name in ("longest", "changing", "share")),
     ]
 
@@ -374,8 +372,7 @@ class Filter:
 
     def _record(self, record: Record, parameters: Parameters) -> _Record:
         """Return the struct `record`, which is made once for each log and set of states with a covariance."""
-        lags, is_mean = parameters.lags or [None] * len(record.sensors), record.averaged is not None
-        lagging = [is_mean or lag is not None for lag in lags]
+        lagging = [lag is not None for lag in parameters.lags or [None] * len(record.sensors)]
         acting = (*lagging, *(bool(np.all(one.size > 0.0)) for one in parameters.slow))
         found = self._records.get((record, acting))
         if found is None:  # another thread may have made it meanwhile, and its arrays must stay alive
@@ -406,13 +403,12 @@ class Filter:
         ]
         sizes = len(record.time), len(record.told), len(record.sensors)
         tilt = [np.ascontiguousarray(row) for row in record.tilt - np.array([[first], [0.0], [0.0]])]
-        means = None if record.averaged is None else record.averaged - first
-        optional = [None if array is None else np.ascontiguousarray(array) for array in (record.beside, means)]
+        beside = None if record.beside is None else np.ascontiguousarray(record.beside)
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
-        others = [None if array is None else array.ctypes.data for array in optional]
-        kept: list[object] = [*arrays, *tilt, *optional]
+        others = None if beside is None else beside.ctypes.data
+        kept: list[object] = [*arrays, *tilt, beside]
         tilts = len(tilt[0]), record.wanders
-        return _Record(*sizes, *pointers[0], *tilts, *pointers[1], *others, *self._steps), kept
+        return _Record(*sizes, *pointers[0], *tilts, *pointers[1], others, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
         """Return the kind and the index of a sensor, as filter.c wants them."""

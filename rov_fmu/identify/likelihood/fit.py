@@ -20,7 +20,6 @@ from rov_fmu.identify.likelihood.search import (
     Misfit,
     StructureFit,
     StructureSearch,
-    settled,
     structure,
     unseen_errors,
     windows,
@@ -137,7 +136,7 @@ def fit_all(
     start = StructureFit({}, quick, ends[0], score, score)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
     work.leave_out(*((HYPOTHESES, REFINED) if is_mistake else ()))
-    search, first, now = _searched_for_structure(start, full, work, is_mistake=is_mistake)
+    search, now = _searched_for_structure(start, full, work, is_mistake=is_mistake)
     full, near, is_wrong = now.objective, now.minimum, is_mistake or search.now.is_hopeless
     before = windows(search.plain.objective, search.plain.minimum.z)
     best = near
@@ -151,7 +150,7 @@ def fit_all(
         abs(ends[-1].z[n] - ends[0].z[n]) / max(posterior.errors[n], _SAME * full.deviation[n])
         for n in posterior.of_vehicle
     ]
-    odds = {**first, **search.odds}
+    odds = search.odds
     if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
     misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best)))
@@ -167,7 +166,7 @@ def fit_all(
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
         (ends[0].z, ends[-1].z),
-        {**dict.fromkeys(first), **search.now.starts},
+        search.now.starts,
         odds,
         search.alike,
         search.has_ended,
@@ -177,9 +176,8 @@ def fit_all(
 
 def _searched_for_structure(
     start: StructureFit, full: Objective, work: ProgressReport, *, is_mistake: bool
-) -> tuple[StructureSearch, dict[Suspect, float], StructureFit]:
-    """Search for the structure from a fit to thinned logs, and return the search, the odds of what left samples out,
-    and the fit to all samples at its end.
+) -> tuple[StructureSearch, StructureFit]:
+    """Search for the structure from a fit to thinned logs; return the search, and the fit to all samples at its end.
 
     Where the model is wrong along all axes, thinned logs tell as well what explains it. All samples are fitted to the
     end only when something does.
@@ -194,10 +192,7 @@ def _searched_for_structure(
         search.run()
         return search
 
-    search, first = StructureSearch(start), dict[Suspect, float]()
-    if start.is_hopeless and not is_mistake:
-        settled_start, first = settled(start)
-        search = searched(settled_start)
+    search = searched(start) if start.is_hopeless and not is_mistake else StructureSearch(start)
     now, is_wrong = search.now, is_mistake or search.now.is_hopeless
     if is_wrong:
         full = applied(search.plain.objective, now.starts)
@@ -206,12 +201,11 @@ def _searched_for_structure(
     near = minimise(full, begin, work.steps("all samples"), most=most, last=False)
     work.fits(full, near)
     if is_wrong:
-        return search, first, replace(now, objective=full, minimum=near)
-    plain, first = settled(StructureFit({}, full, near, evidence(full, near), start.quick))
-    search = searched(plain, search)
-    if first or search.odds:
+        return search, replace(now, objective=full, minimum=near)
+    search = searched(StructureFit({}, full, near, evidence(full, near), start.quick), search)
+    if search.odds:
         work.fits(search.now.objective, search.now.minimum)
-    return search, first, search.now
+    return search, search.now
 
 
 def _from_starts(quick: Objective, work: ProgressReport) -> list[Minimum]:

@@ -1,7 +1,7 @@
 """What the structure of the model may lack: one table of hypotheses, and J where some of them are true.
 
 A hypothesis frees rows of the table of parameters, which otherwise stay where they change nothing, or it changes what
-the filter reads of the logs: which samples count, which commands act, and what lies between them.
+the filter reads of the logs: which commands act, and what lies between them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -77,10 +77,6 @@ class Hypothesis:
     """True if it changes the steady forces, so that J shows how likely it is before any fit."""
     has_times: bool = False
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
-    is_first: bool = False
-    """True if it changes what samples are, which would mislead all others. So it is tried before these."""
-    leaves_out: bool = False
-    """True if it leaves out velocities, which makes any model better: it has to explain the errors of the others."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
     frees: tuple[str, ...] = ()
@@ -211,11 +207,6 @@ def _has_commands_at_ends(sampled: SampledLog) -> bool:
     return bool(np.abs(sampled.record.inputs[[0, -1]]).max() > LEAST_COMMAND)
 
 
-def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield each file in whose first half a horizontal velocity jumps. Beyond, too little is left to judge it by."""
-    yield from ((one.file,) for one in logs if one.jump is not None and one.jump < np.mean(one.record.time[[0, -1]]))
-
-
 def _with_both_velocities(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield one suspect, about all logs, if one has the velocity over ground both ahead and to starboard."""
     if any({SURGE, SWAY} <= {s.axis for s in one.record.sensors if s.is_horizontal_velocity} for one in logs):
@@ -232,12 +223,6 @@ def _of_lost(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
     """Return the files, and along which axis most of the command is lost between their rows."""
     most = max((one for one in logs if one.file in of), key=lambda one: max(one.lost.values()))
     return {"of": listed(of), **lost_in_words(most.lost, most.interval)}
-
-
-def _of_settled(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
-    """Return each file with the time since the start of the log from which its velocities count."""
-    some = (one for one in logs if one.file in of)
-    return {"of": listed(f"{one.file} (until {one.settled - one.log.begin:.1f} s)" for one in some)}
 
 
 def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
@@ -339,32 +324,6 @@ def _uncoupled(known: Prior, logs: Logs) -> Iterator[Of]:
 
 
 HYPOTHESES = {
-    "unsettled velocity": Hypothesis(
-        0.05,
-        _with_jumps,
-        _in_logs(lambda _, one: one if (at := one.jump) is None else one.settled_at(at)),
-        sentence=(
-            "{of}: the measured velocity is not that of the vehicle before it jumps, as of an estimator without a "
-            "position{odds}. It is left out until then. Begin a dive when the estimator has its position"
-        ),
-        in_words=_of_settled,
-        changes_thrust=False,
-        is_first=True,
-        leaves_out=True,
-    ),
-    "means of rows": Hypothesis(
-        0.03,
-        _files(lambda one: one.is_slow_table),
-        _in_logs(lambda _, one: one.with_means()),
-        sentence=(
-            "{of}: each row has the means of its interval{odds}. They are compared with means, and angles whose mean "
-            "may contain a jump by a full turn are left out. Log values of a moment, at 10 Hz or more"
-        ),
-        alarm=0.0,  # rows far apart seem to have so much noise that no error is large
-        changes_thrust=False,
-        is_first=True,
-        # no null: a row has a mean or the value of a moment, and nothing lies between
-    ),
     "idle commands": Hypothesis(
         0.05,
         _files(_has_commands_at_ends),
@@ -498,7 +457,7 @@ HYPOTHESES = {
     ),
 }
 """All hypotheses about the structure, by the kind of their parameter, in the order in which they change a model: first
-which samples count, then which commands act, and then what lies between them. Each is tried after the alarm."""
+which commands act, and then what lies between them. Each is tried after the alarm."""
 
 
 def in_order(some: Iterable[Suspect]) -> list[Suspect]:

@@ -581,10 +581,7 @@ def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
 def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
     file, half = sampled.file, 0.5 * sampled.interval
     share, width = (0.5, {"mean": 1.0, "low": 1.0}) if sampled.is_momentary else (1.0, {})
-    mean = -half
-    if sampled.has_means:  # their commands act in the intervals of the measurements, at known times
-        share, mean, width = 0.2, -sampled.interval, {"mean": 0.0, "high": 0.0}
-    yield make(OFFSET, file, mean=mean, deviation=max(share * half, 0.005), log=number)
+    yield make(OFFSET, file, mean=-half, deviation=max(share * half, 0.005), log=number)
     yield make(WIDTH, file, log=number, **width)
     directions = CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]
     for part in directions if sampled.shows_horizontal else ():

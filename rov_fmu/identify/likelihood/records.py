@@ -4,10 +4,10 @@ Nothing is resampled onto a common grid. Samples that come faster than the vehic
 which keeps what they tell and bounds the time of a fit.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from math import inf, pi
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,15 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axi
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
-from rov_fmu.identify.likelihood.kinds import LAG, PRIORS
 from rov_fmu.identify.result import least_error
 from rov_fmu.io.groups import grouped
-from rov_fmu.tank.arrays import Array, Flags, rms
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.catalogue import MeasuredQuantity
-from rov_fmu.tank.clocks import first_in_each, gaps, held, in_rows
+from rov_fmu.tank.clocks import first_in_each, gaps, held
 from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
-from rov_fmu.tank.quality import gaps_in_words, jumps
+from rov_fmu.tank.quality import gaps_in_words
 from rov_fmu.vehicle.vehicle import Vehicle
 
 FASTEST = 20.0
@@ -55,17 +54,6 @@ LEAST_COMMAND = 0.05
 _CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
 """Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
 them has another command, and if more than the third share of a command is lost between them."""
-_SAME_ROWS = 0.9
-"""A log is a table if more than this share of its measurements has the times of its commands."""
-_PARTS = 4
-"""Of so many parts are the intervals in which a command changes gradually."""
-_GAP_OF_ROWS = 1.5
-"""A mean is over the time since the row before, or over the usual interval if that is longer by this factor."""
-_UNKNOWN_ANGLE = 1.0
-"""The standard deviation of an angle, or of a part of its quaternion, at the start if its means are left out there."""
-_SMOOTH, _AT_SEAM = pi / 3.0, 0.1
-"""The change of an angle changes by less than the first number from row to row, rad, unless one of them is averaged
-across a jump. Noise lets an angle exceed a jump by less than the second number."""
 _LEAST_BESIDE = 1e-3
 """The least second difference of the thrust that counts, relative to full thrust."""
 _LEAST_PUSH = 0.02
@@ -92,11 +80,6 @@ class SampledChannel:
         """What it measures, with the unit."""
         return self.channel.quantity
 
-    def some_of(self, kept: Flags) -> "SampledChannel":
-        """Return the channel with some of its samples."""
-        time, values = self.channel.time[kept], self.channel.values[kept]
-        return replace(self, channel=replace(self.channel, time=time, values=values))
-
 
 @dataclass(frozen=True, eq=False)
 class SampledLog:
@@ -116,10 +99,6 @@ class SampledLog:
     """The share of the command along each axis that is lost between its rows, by the axis."""
     is_momentary: bool = False
     """True if its rows have the commands of a moment, between which they follow a straight line, on the average."""
-    has_means: bool = False
-    """True if its rows have the means of commands and measurements over the interval before them."""
-    settled: float = -inf
-    """The time from which its horizontal velocities count, s: before, their sensor did not know them."""
 
     @property
     def file(self) -> str:
@@ -131,53 +110,14 @@ class SampledLog:
         """How far ahead positions are predicted, s, and velocities, too, if commands are lost between rows."""
         return _ROWS_AHEAD * self.interval if self.lost else AHEAD
 
-    @property
-    def has_windows(self) -> bool:
-        """True if commands change at times that its rows do not tell exactly."""
-        return self.has_means or bool(self.lost)
-
-    def _changed(self, change: Callable[[Record], Record], **own: Any) -> "SampledLog":
-        """Return the log with a change of what the filter reads, of all samples and of fewer."""
-        return replace(self, record=change(self.record), thinned=change(self.thinned), **own)
-
     def _with_rows(self, **columns: Any) -> "SampledLog":
         """Return the log with other columns of its rows."""
-        return self._changed(lambda record: replace(record, **columns))
+        return replace(self, record=replace(self.record, **columns), thinned=replace(self.thinned, **columns))
 
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
         assert not self.is_momentary
         return self._with_rows(inputs=inputs)
-
-    @property
-    def jump(self) -> float | None:
-        """The time of the first sample after the largest jump of a horizontal velocity, s; None if there is none."""
-        found = [
-            (abs(channel.values[n + 1] - channel.values[n]), float(channel.time[n + 1]))
-            for channel in (m.channel for m in self.measured if m.sensor.is_horizontal_velocity)
-            for n in jumps(channel.time, channel.values, is_velocity=True)
-        ]
-        return max(found)[1] if found else None
-
-    def settled_at(self, time: float) -> "SampledLog":
-        """Return the log without the horizontal velocities and positions before a time, s."""
-
-        def counts(m: SampledChannel) -> SampledChannel:
-            if not m.sensor.is_horizontal:
-                return m
-            left = m.some_of(m.channel.time >= time)
-            return replace(left, noise=_least_noise(left)) if self.lost else left
-
-        def later(record: Record) -> Record:
-            horizontal = np.array([sensor.is_horizontal for sensor in record.sensors])
-            kept = (record.time >= time) | ~horizontal[record.sensor]
-            some = [] if kept.all() else [s for s in record.sensors if s.is_horizontal]
-            velocities = dict.fromkeys((s.axis.velocity for s in some if s.is_velocity), _CALM)
-            positions = dict.fromkeys((DRIFTS[s.axis.place] for s in some if not s.is_velocity), _ANYWHERE)
-            start = {**record.start, **dict.fromkeys(velocities, 0.0)}
-            return _some_of(record, kept, start=start, errors={**record.errors, **velocities, **positions})
-
-        return self._changed(later, measured=tuple(map(counts, self.measured)), settled=time)
 
     @property
     def spans(self) -> Array:
@@ -209,59 +149,6 @@ class SampledLog:
         return [m for m in velocities if m.axis in axes or (is_horizontal and m.sensor.is_horizontal)]
 
     @property
-    def is_slow_table(self) -> bool:
-        """True if its measurements have the times of its commands, and these are so far apart that J tells means from
-        values of a moment. A mean is late by half the time between rows, which must be more than a usual lag."""
-        commands = self.log.commands
-        assert commands
-        return 0.5 * self.interval > PRIORS[LAG].deviation and all(
-            np.mean(np.isin(m.channel.time, commands.rows)) > _SAME_ROWS for m in self.measured
-        )
-
-    def with_means(self) -> "SampledLog":
-        """Return the log if its rows are means over the interval before them.
-
-        A command between those of the rows before and after changed once, at a time that its mean tells, unless one of
-        these is also between others: then it changed gradually. An angle whose mean may contain a jump by a full turn
-        is left out.
-        """
-        commands = self.log.commands
-        assert commands
-        span, rows = self.interval, np.union1d(commands.rows, self.record.told)
-        inputs = held(self.record.told, self.record.inputs, rows)
-        columns = {
-            name: _steps(rows, column, span) if name in self.layout.commands else (rows, column)
-            for name, column in zip(self.layout.inputs, inputs.T, strict=True)
-        }
-        told, then = in_rows(columns)
-        made = {"told": told, "since": told, "inputs": np.column_stack([*then.values()])}
-
-        measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
-        if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
-            angles = {"psi", *QUATERNION} & {*start}
-            start = {**start, **{name: _start(measured, self.layout, ())[0][name] for name in angles}}
-            errors = {**errors, **dict.fromkeys(angles, _UNKNOWN_ANGLE)}
-
-        def of_means(record: Record) -> Record:
-            kept, begin = np.ones(len(record.time), bool), record.time.copy()
-            for number, m in enumerate(measured):
-                own = np.flatnonzero(record.sensor == number)
-                before, time = record.time[own[:-1]], record.time[own[1:]]
-                begin[own[1:]] = np.where(time - before > _GAP_OF_ROWS * span, time - span, before)
-                kept[own] = np.isin(record.time[own], m.channel.time)
-            tilt = record.tilt - np.array([[0.5 * span], [0.0], [0.0]])
-            return _some_of(record, kept, **made, start=start, errors=errors, averaged=begin[kept], tilt=tilt)
-
-        return self._changed(of_means, measured=tuple(measured), lost={}, has_means=True)
-
-    def _clear(self, m: SampledChannel) -> SampledChannel:
-        """Return a channel without the means of an angle that may contain a jump by a full turn."""
-        raw = self.log.used(m.quantity.name)
-        if raw is None or raw.unwrapped[1] is raw.samples[1]:
-            return m
-        return m.some_of(_clear_of(0.0 if raw.samples[1].min() > -_AT_SEAM else pi, m.channel.values))
-
-    @property
     def shows_horizontal(self) -> bool:
         """True if a horizontal position is measured, or a horizontal velocity over ground."""
         return any(s.is_level and (s.over_ground or not s.is_velocity) for s in self.record.sensors)
@@ -290,65 +177,6 @@ class SampledLog:
         after = np.pad(ends[1:], ((0, 1), (0, 0)))
         beside = np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2)
         return replace(self._with_rows(beside=beside), is_momentary=True)
-
-
-def _some_of(record: Record, kept: Flags, **columns: Any) -> Record:
-    """Return a record with some of its samples, and with other columns."""
-    samples = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
-    return replace(record, **samples, **columns)
-
-
-def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
-    """Return when a command changes in the intervals before rows, and its values then, from its means over these.
-
-    The times are those of the rows at whose intervals' beginnings it changes, later within these where it is known.
-    """
-    before, now, after = values[:-2], values[1:-1], values[2:]
-    is_between = np.pad((np.minimum(before, after) < now) & (now < np.maximum(before, after)), 1)
-    alone = is_between & ~np.roll(is_between, 1) & ~np.roll(is_between, -1)
-    at = np.flatnonzero(alone)
-    time, found = rows.astype(float), values.copy()
-    time[at] += span * (values[at] - values[at + 1]) / (values[at - 1] - values[at + 1])
-    found[at] = values[at + 1]
-    others = is_between & ~alone
-    later = rows[others, None] + span * np.arange(_PARTS) / _PARTS
-    time = np.concatenate([time[~others], later.ravel()])
-    found = np.concatenate([found[~others], _means_of_parts(values, others).ravel()])
-    order = np.argsort(time)
-    return time[order], found[order]
-
-
-def _means_of_parts(values: Array, at: Flags) -> Array:
-    """Return the means of equal parts of some intervals in which a command changes, by the means of all intervals.
-
-    The value is a parabola in each interval that is monotone (the piecewise parabolic method, Colella and Woodward
-    1984, doi:10.1016/0021-9991(84)90143-8).
-    """
-    far = np.pad(values, 2, mode="edge")
-    edges = (7.0 * (far[1:-2] + far[2:-1]) - (far[:-3] + far[3:])) / 12.0
-    edges = np.clip(edges, np.minimum(far[1:-2], far[2:-1]), np.maximum(far[1:-2], far[2:-1]))
-    first, last, mean = edges[:-1][at], edges[1:][at], values[at]
-    first = np.clip(first, *np.sort([3.0 * mean - 2.0 * last, last], axis=0))
-    last = np.clip(last, *np.sort([3.0 * mean - 2.0 * first, first], axis=0))
-    bend = 6.0 * mean - 3.0 * (first + last)
-    x = (np.arange(_PARTS + 1) / _PARTS)[:, None]
-    integral = first * x + 0.5 * (last - first + bend) * x**2 - bend * x**3 / 3.0
-    return np.asarray(_PARTS * np.diff(integral, axis=0).T)
-
-
-def _clear_of(seam: float, values: Array) -> Flags:
-    """Return which means of an angle surely contain no jump by a full turn.
-
-    They are farther from it than the angle changes from or to the next one, and one of three that change smoothly: by
-    less than twice _SMOOTH each, and with less than _SMOOTH between these changes.
-    """
-    steps = np.remainder(np.diff(values) + pi, 2.0 * pi) - pi
-    size = np.abs(steps)
-    each = np.pad((np.abs(np.diff(steps)) < _SMOOTH) & (np.maximum(size[1:], size[:-1]) < 2.0 * _SMOOTH), 1)
-    smooth = each | np.roll(each, 1) | np.roll(each, -1)
-    largest = np.maximum(np.pad(size, (0, 1)), np.pad(size, (1, 0)))
-    distance = np.abs(np.remainder(values - seam + pi, 2.0 * pi) - pi)
-    return np.asarray(smooth & (distance > largest))
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

@@ -8,7 +8,7 @@ factor (Laplace approximation), with the prior probability, decides. What wins i
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from functools import cache, cached_property, reduce
 from itertools import islice
 from math import hypot, inf, isnan, log, nan, sqrt
@@ -16,7 +16,7 @@ from math import hypot, inf, isnan, log, nan, sqrt
 import numpy as np
 from scipy.special import chdtri
 
-from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.hypotheses import (
@@ -282,7 +282,7 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
 
 def windows(objective: Objective, z: Array) -> dict[str, float]:
     """Return the part of the time between rows in which a command may change, of each log that does not tell when."""
-    found = {one.file: objective.table.get(z, WIDTH, one.file) for one in objective.logs if one.has_windows}
+    found = {one.file: objective.table.get(z, WIDTH, one.file) for one in objective.logs if one.lost}
     return {
         file: 1.0 if width > MOST_OF_ROW else max(float(width), CONSTANTS["narrowest"].value)
         for file, width in found.items()
@@ -307,9 +307,7 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
     now, parameters = windows(objective, z), objective.table.parameters
-    widths = [
-        one.interval * (before if one.is_momentary else now)[one.file] for one in objective.logs if one.has_windows
-    ]
+    widths = [one.interval * (before if one.is_momentary else now)[one.file] for one in objective.logs if one.lost]
     found = np.zeros((len(z), len(z)))
     vehicle, shapes = objective.table.model(z)
     for axis, misfit in misfits.items():
@@ -520,47 +518,6 @@ def fitted(
     return None
 
 
-def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
-    """Return the fit to samples that do not mislead the search, and the odds of the hypotheses that change the samples.
-
-    J is compared over the samples that no hypothesis leaves out.
-    """
-    odds = dict[Suspect, float]()
-    for kind, hypothesis in HYPOTHESES.items():
-        if not hypothesis.is_first or plain.predicted <= hypothesis.alarm:
-            continue
-        every = [*hypothesis.suspects(plain.objective.table.known, plain.objective.logs)]
-        end, won = plain, dict[Suspect, float]()
-        for of in every:
-            prior = 2.0 * log(hypothesis.probability / len(every))
-            fit = fitted(end, end.objective, {(kind, of): None}, prior)
-            if fit and (gain := fit.score - end.score - _left_out(end, fit.objective)) > WINS:
-                won[kind, of] = gain
-                end = replace(fit, starts={}, score=fit.score - prior)
-        if not hypothesis.leaves_out or _explains_by_samples(plain, end):
-            plain, odds = end, odds | won
-    return plain, odds
-
-
-def _explains_by_samples(before: StructureFit, after: StructureFit) -> bool:
-    """Return True if a fit without some velocities predicts the others, or far better than one with all of them did.
-
-    Any model that lacks something is better without most of a sensor's samples, so that J alone does not tell.
-    """
-    old, new = (max(fit.misfits.get(axis, Misfit()).ratio for axis in (SURGE, SWAY)) for fit in (before, after))
-    return new <= max(ALARM, sqrt(old))
-
-
-def _left_out(fit: StructureFit, objective: Objective) -> float:
-    """Return the part of J of the samples that another objective leaves out."""
-    gone = 0.0
-    for old, new, data in zip(fit.objective.records, objective.records, fit.minimum.data, strict=False):
-        if len(new.time) < len(old.time):
-            left_out = ~np.isin(old.time + 1j * old.sensor, new.time + 1j * new.sensor)
-            gone += cost(data.innovations[left_out], data.variances[left_out])
-    return gone
-
-
 class StructureSearch:
     """The search among sets of hypotheses, each of which changes the same model.
 
@@ -717,7 +674,7 @@ class StructureSearch:
         """All hypotheses, with where each may begin."""
         objective, found = self.plain.objective, dict[Suspect, Sequence[Start]]()
         for kind, one in HYPOTHESES.items():
-            for of in () if one.is_first else one.suspects(objective.table.known, objective.logs):
+            for of in one.suspects(objective.table.known, objective.logs):
                 if one.has_times:
                     if times := times_of(objective, self.plain.minimum.z, of):
                         found[kind, tuple(times)] = (tuple(times.values()),)

@@ -9,7 +9,16 @@ from rov_fmu.equation.terms import equation_of, mass_matrix
 from rov_fmu.report.templates import number
 
 _TEXT = Language(
-    {"neg": "−{}", "-": "{} − {}", "*": "{} {}", "square": "{}²", "cube": "{}³", "abs": "|{}|", "directed": "{}±", "saturated": "{} within ±1"},
+    {
+        "neg": "−{}",
+        "-": "{} − {}",
+        "*": "{} {}",
+        "square": "{}²",
+        "cube": "{}³",
+        "abs": "|{}|",
+        "directed": "{}±",
+        "saturated": "{} within ±1",
+    },
     {**RANKS, **dict.fromkeys(("square", "cube"), (CALL, (CALL,)))},
     lambda value: number(value, 4),
 )

@@ -195,32 +195,6 @@ def test_a_heading_with_a_lag_turns_over(name: str) -> None:
     assert np.remainder(shown - expected + pi, 2.0 * pi) - pi == pytest.approx(0.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("has_gap", [False, True])
-def test_a_mean_is_that_of_the_motion_with_the_variance_of_its_errors(has_gap: bool) -> None:
-    """The samples are of every 0.5 s, and of every 5 ms for the motion. The second mean follows a gap."""
-    span, step, errors = 0.5, 0.005, {"w": 0.1, "z": 0.02}
-    times = np.array([0.0, 1.5 if has_gap else 0.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5])
-    rows = record((DEPTH, VELOCITY), [(t, n) for t in times.tolist() for n in (0, 1)], errors=errors)
-    since = np.where(rows.time > 0.0, rows.time - span, 0.0)
-    means = replace(rows, averaged=since)
-    known = parameters(LAGGING, 2, white=WHITE)
-
-    def shown(log: Record, **start: float) -> Array:
-        return -Filter(LAGGING).run(replace(log, start={**START, **start}), known, begin=0.0).innovations.reshape(-1, 2)
-
-    fine = shown(record((DEPTH, VELOCITY), [(step * k, n) for k in range(901) for n in (0, 1)], errors=errors))
-    ends = np.round(times[1:] / step).astype(int)
-    expected = [np.trapezoid(fine[end - 100 : end + 1], dx=step / span, axis=0) for end in ends.tolist()]
-    assert shown(means)[1:] == pytest.approx(np.array(expected), abs=2e-3)
-    assert shown(means)[0] == pytest.approx(fine[0]), "the first sample has no interval"
-
-    slope = [(shown(means, **{name: START[name] + 1e-4}) - shown(means)) / 1e-4 for name in errors]
-    two = replace(means, time=means.time[:4], value=means.value[:4], sensor=means.sensor[:4], averaged=since[:4])
-    first = Filter(LAGGING).run(two, known, begin=0.0).variances
-    of_errors = sum((one[1] * error) ** 2 for one, error in zip(slope, errors.values(), strict=True))
-    assert first[2:] == pytest.approx(of_errors + np.square(WHITE), rel=0.02)
-
-
 PROBES = (Sensor(YAW, is_velocity=False), Sensor(SURGE, is_velocity=True), Sensor(SURGE, is_velocity=False))
 CURRENT = {"V_N": 0.2, "V_E": -0.1}
 

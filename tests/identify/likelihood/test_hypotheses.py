@@ -33,7 +33,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
 from rov_fmu.identify.likelihood.kinds import KINDS, NEUTRAL, OWN_BANDS, OWN_CURVE, TURN
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
-from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
+from rov_fmu.identify.likelihood.records import SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
     Misfit,
     StructureFit,
@@ -43,7 +43,6 @@ from rov_fmu.identify.likelihood.search import (
     comparison,
     fitted,
     rough,
-    settled,
     structure,
     times_of,
     unseen_errors,
@@ -93,8 +92,6 @@ class Fault:
     value: float | None = None
     rotor_lag: float = 0.0
     """The time constant of the rotors' speeds, s."""
-    settled: float = 0.0
-    """Until when the measured velocities drift away, s."""
     inertia: float = 1.0
     """The factor of the inertia."""
     turned: float = 0.0
@@ -170,10 +167,7 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     for title, variable in OUTPUTS.items():
         if variable in motion:
             values = np.degrees(motion[variable]) if "deg" in title else motion[variable]
-            drift = (
-                0.6 * (time < fault.settled) * time / fault.settled if fault.settled and "velocity" in title else 0.0
-            )
-            columns[title] = values + NOISE[title] * rng.standard_normal(n) + drift
+            columns[title] = values + NOISE[title] * rng.standard_normal(n)
     rows = np.column_stack([time, *columns.values()]).tolist()
     lines = [",".join(f"{value:.5g}" for value in row) for row in rows]
     return "\n".join([",".join(["time [s]", *columns]), *lines]) + "\n"
@@ -292,18 +286,8 @@ def test_idle_commands_of_one_file_leave_another_alone(model: Objective) -> None
     assert np.array_equal(second.record.inputs, other.record.inputs)
 
 
-def with_jump(sampled: SampledLog) -> SampledLog:
-    """The log, whose horizontal velocities jump by 2 m/s after a third of it."""
-
-    def jumping(m: SampledChannel) -> SampledChannel:
-        values = m.channel.values + 2.0 * (np.arange(len(m.channel.values)) > len(m.channel.values) // 3)
-        return replace(m, channel=replace(m.channel, values=values)) if m.sensor.is_horizontal_velocity else m
-
-    return replace(sampled, measured=tuple(map(jumping, sampled.measured)))
-
-
 def one_of_each(model: Objective) -> Starts:
-    """One hypothesis of each kind about a model whose log has momentary commands in far rows and a velocity jump."""
+    """One hypothesis of each kind about a model whose log has momentary commands in far rows."""
     told, found = model.logs[0].record.told, dict[Suspect, Start]()
     for kind, hypothesis in HYPOTHESES.items():
         of = next(hypothesis.suspects(model.table.known, model.logs))
@@ -314,7 +298,7 @@ def one_of_each(model: Objective) -> Starts:
 def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Objective) -> None:
     """Lines between momentary commands are those of the commands that act, and a slew limit repeats none of them."""
     plain = uncoupled(four_axes)
-    lossy = with_logs(plain, [with_jump(replace(one, lost={"yaw": 0.1}, interval=0.5)) for one in plain.logs])
+    lossy = with_logs(plain, [replace(one, lost={"yaw": 0.1}, interval=0.5) for one in plain.logs])
     starts = one_of_each(lossy)
     every = [*starts]
     for pair in combinations(every, 2):
@@ -381,7 +365,6 @@ def seldom(sampled: SampledLog, number: int) -> SampledLog:
 
 
 WITHOUT_NULL = (
-    "means of rows",
     "coupling",
     "reversed commands",
     "swapped commands",
@@ -400,11 +383,8 @@ def test_a_hypothesis_that_is_absent_is_the_model_without_it(
     hypothesis = HYPOTHESES[kind]
     of_kind = four_axes if kind == TURN else model
     plain = with_logs(of_kind, [seldom(one, number) for one in of_kind.logs])
-    if hypothesis.is_first:
-        absent = with_logs(plain, [one.settled_at(-np.inf) for one in plain.logs])
-    else:
-        of = next(hypothesis.suspects(plain.table.known, plain.logs))
-        absent = applied(plain, {(kind, of): ((-np.inf, np.inf),) * len(of) if hypothesis.has_times else None})
+    of = next(hypothesis.suspects(plain.table.known, plain.logs))
+    absent = applied(plain, {(kind, of): ((-np.inf, np.inf),) * len(of) if hypothesis.has_times else None})
     values = []
     for some in (plain, absent):
         objective = applied(some, {}, thinned=True)
@@ -678,31 +658,6 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     assert narrow.widened({}, np.zeros_like(found)) is narrow
 
 
-def test_velocities_before_they_jump_are_left_out(model: Objective, tmp_path: Path) -> None:
-    """An estimator without a position drifts away until it gets one. All else in the log stays."""
-    assert not [*HYPOTHESES["unsettled velocity"].suspects(model.table.known, model.logs)]
-    drifting = folder(tmp_path, "videoray", Fault("", settled=16.5))
-    other = Objective.of_known(*begin(load_tests(drifting)))
-    (of,) = HYPOTHESES["unsettled velocity"].suspects(other.table.known, other.logs)
-    late = replace(other.logs[0], record=replace(other.logs[0].record, time=other.logs[0].record.time - 20.0))
-    assert not [*HYPOTHESES["unsettled velocity"].suspects(other.table.known, [late])]
-    left = applied(other, {("unsettled velocity", of): None})
-    ((sampled,), (whole,)) = left.logs, other.logs
-    assert of == ("dive_0.csv",)
-    assert sampled.settled == pytest.approx(16.5)
-    assert sampled.jump is None
-    assert left.table.parameters == other.table.parameters
-    for record, old in ((sampled.record, whole.record), (sampled.thinned, whole.thinned)):
-        is_velocity = np.array([s.is_horizontal_velocity for s in old.sensors])[old.sensor]
-        kept = ~is_velocity | (old.time >= 16.5)
-        assert 0 < np.sum(~kept) < np.sum(is_velocity)
-        for name in ("time", "value", "sensor"):
-            assert np.array_equal(getattr(record, name), getattr(old, name)[kept])
-        assert np.array_equal(record.inputs, old.inputs)
-        assert record.start["u"] == 0.0
-        assert record.errors["u"] > old.errors["u"]
-
-
 @pytest.mark.parametrize("health", spread([1.0, 0.5], [0.5], [1.0]))
 def test_only_what_is_named_silences_the_alarm(health: float, tmp_path: Path) -> None:
     """The heading of the vehicle is unstable, and its controller acts between the rows of the log.
@@ -854,30 +809,6 @@ def test_no_cause_is_named_at_a_bound_of_the_search_nor_a_lag_where_no_axis_is_r
     search.run()
     assert [*search.odds] == [suspect] * is_named
     assert [*search.refuted] == [suspect] * (not is_named)
-
-
-@pytest.mark.parametrize(("before", "after", "is_named"), [(20.0, 2.9, True), (20.0, 5.0, False), (100.0, 9.0, True)])
-def test_velocities_are_left_out_only_if_the_others_are_then_predicted(
-    before: float, after: float, is_named: bool, model: Objective, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """J alone would leave out the velocities of any sensor that the model does not explain, such as a stale one."""
-    drifting = with_logs(model, [with_jump(one) for one in model.logs])
-    z = drifting.mean
-    runs = drifting.runs(z)
-    data = [Data.of(run, [], len(z)) for run in runs]
-    plain = StructureFit({}, drifting, Minimum(z, 0.0, runs, data, np.eye(len(z))), 0.0, 0.0)
-
-    def fit(_: object, plain: Objective, starts: Starts, *__: object) -> StructureFit:
-        return StructureFit(starts, applied(plain, starts), cast("Minimum", "without"), 1e9, 1e9)
-
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
-    monkeypatch.setattr(
-        "rov_fmu.identify.likelihood.search.structure",
-        lambda _, of, **__: {SURGE: Misfit(after if of == "without" else before), YAW: Misfit(8.0)},
-    )
-    found, odds = settled(plain)
-    assert [kind for kind, _ in odds] == ["unsettled velocity"] * is_named
-    assert (found is plain) == (not is_named)
 
 
 def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.MonkeyPatch) -> StructureSearch:
@@ -1115,12 +1046,6 @@ def test_a_coupled_vehicle_is_named_and_written(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_rotors_whose_speed_lags_are_told_from_a_lag_of_the_force(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["rotors"], 1, 1)
-
-
-@pytest.mark.long
-def test_velocities_of_an_estimator_without_a_position_are_named(tmp_path: Path) -> None:
-    fault = Fault("unsettled velocity", "dive_0.csv (until 16.5 s)", settled=16.5)
-    check(tmp_path, "videoray", fault, 1, 1)
 
 
 @pytest.mark.weekly

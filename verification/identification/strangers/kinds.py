@@ -328,7 +328,6 @@ FAULTS = (
         "unsettled velocity",
         "an estimator's velocity drifts by 0.6 m/s until it gets a position",
         shown=_of_velocities(_unsettled),
-        causes=r"unsettled velocity .*",
         group="law",
     ),
     Kind("rotor lag", "the lag is on the rotors' speed", _rotors, causes="rotor lag", group="law"),
