@@ -28,7 +28,7 @@ HOMES = {
         "identify.inspection.inspected": "Inspected",
         "identify.likelihood.kinds": "PRIORS",
         "identify.result": "Answer AxisResult Disturbance Identification IdentifiedCoefficient IdentifiedEffect "
-        "Logging MeasuredPoint NextTest Prediction SensorNoise Slip Verdict",
+        "Logging MeasuredPoint Prediction SensorNoise Slip Verdict",
         "identify.tuning": "Target Tuning TuningError tune",
         "interface.identify_command": "identify_folder",
         "interface.inspect_command": "inspect_logs",

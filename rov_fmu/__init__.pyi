@@ -26,7 +26,6 @@ from rov_fmu.identify.result import IdentifiedCoefficient as IdentifiedCoefficie
 from rov_fmu.identify.result import IdentifiedEffect as IdentifiedEffect
 from rov_fmu.identify.result import Logging as Logging
 from rov_fmu.identify.result import MeasuredPoint as MeasuredPoint
-from rov_fmu.identify.result import NextTest as NextTest
 from rov_fmu.identify.result import Prediction as Prediction
 from rov_fmu.identify.result import SensorNoise as SensorNoise
 from rov_fmu.identify.result import Slip as Slip

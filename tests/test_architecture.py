@@ -68,14 +68,12 @@ MAY_IMPORT = {
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/equation": 13,
-    "rov_fmu/identify": 13,
     "rov_fmu/identify/likelihood": 13,
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,
     "rov_fmu/tank": 13,
     "rov_fmu/tank/readers": 13,
     "rov_fmu/vehicle": 13,
-    "tests/identify": 13,
     "tests/tank": 13,
     "tests/tank/readers": 13,
     "tests/report": 13,

@@ -83,7 +83,7 @@ TESTS = {
     "rov_fmu/prove/*": "prove",
     "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_properties.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
-    "identify/test_next_test.py identify/test_wrench.py tank",
+    "identify/test_wrench.py tank",
     "rov_fmu/tank/readers/*": "tank/test_properties.py tank frozen/test_known_results.py identify/test_wrench.py",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
     "rov_fmu/tank/*": "tank frozen/test_known_results.py interface/test_inspect_command.py "

@@ -78,7 +78,8 @@ _ODD = 3.0
 of the others."""
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
-_SURE = 0.99
+_SURE, _NARROW = 0.99, 0.05
+"""A probability above the first number is told as such; a speed known to the second one needs no other test."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
 _OWN: Mapping[Heading, Mapping[str, str]] = {
@@ -122,7 +123,6 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "velocity over ground": (
             "{what} in {files}{since}. Check for waves, a changing current, and a vehicle that touches something"
         ),
-        "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
         "coupling left out": (
             "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
             "Munk forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
@@ -299,8 +299,7 @@ def error_in_words(p: Prediction) -> str:
 def next_tests(identification: Identification) -> list[str]:
     """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
-    If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
-    any test there is none. How to identify the other axes of the vehicle comes last.
+    Logs that need repair come first. How to identify the other axes of the vehicle comes last.
     """
     of_base = identification.axes_of_base
     groups = grouped(((one.reason, how_to_measure(one.axis, "<axis>")), one.axis) for one in of_base)
@@ -359,19 +358,17 @@ def how_to_measure(axis: Axis, name: str) -> str:
 
 
 def _next_tests(identification: Identification) -> list[str]:
-    tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
-    useful = [
-        f"{test.axis.name}: {test.words}. {capitalized(test.target)}, now {_known_to(test.now)}, "
-        f"becomes {_known_to(test.then)}."
-        for test in tests
-        if test.is_useful
-    ]
-    nothing = (
-        "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, {}."
-    )
-    if not useful and (repairs(identification) or any(one.structure > ALARM for one in identification.axes)):
+    if repairs(identification) or any(one.structure > ALARM for one in identification.axes):
         return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
-    return useful or [nothing.format(test.axis.name, test.target, _known_to(test.now)) for test in tests[:1]]
+    speeds = ((one.axis.name, a) for one in identification.axes for a in one.answers if abs(a.command) <= 0.5)
+    widest = {name: max(own, key=lambda a: half_width(a.steady)) for name, own in grouped(speeds).items()}
+    told = sorted(((half_width(a.steady), name, a.command) for name, a in widest.items()), reverse=True)
+    return [
+        f"{name}: hold {command:.0%} for 8 s, rest, then {-command:.0%} for 8 s. The speed at {command:.0%} is "
+        f"{_known_to(width)}."
+        for width, name, command in told
+        if width > _NARROW
+    ]
 
 
 def _known_to(width: float) -> str:
@@ -454,7 +451,6 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
             and d.axis
             and d.axis not in explained
             and d.kept
-            and not d.cause
             and d.share > MOST_UNKNOWN
             and d.value > _ODD * most
         ):
@@ -736,21 +732,10 @@ def _on_vehicle(identification: Identification) -> Iterator[Finding]:
         yield Finding("assumed vehicle", words=names)
 
 
-_REMEDIES = {
-    "the voltage": ": `voltage = true` in [fit] takes it into account",
-    "the depth": ", as when the buoyancy changes with the pressure, or a tether pulls",
-    "the distance": ", as when a tether pulls",
-    "the command": ", as when thrusters saturate",
-    "the time": ", as when the battery runs down",
-}
-"""What each cause means, or what takes it into account."""
-
-
 def acting(d: Disturbance) -> str:
     """Return what a disturbance does in its log as a sentence without the file: `an unknown slow force of ... acts`."""
     is_turn = d.axis is not None and d.axis.is_rotation
     return d.slow.sentence.format(
-        unknown="a" if d.cause else "an unknown",
         push="torque" if is_turn else "force",
         thrust="torque" if is_turn else "thrust",
         size=percent(d.value) if d.changes_thrust else size_in_words(d.value, d.unit),
@@ -760,12 +745,11 @@ def acting(d: Disturbance) -> str:
 
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
-    kind = "explained disturbance" if d.cause else d.slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
+    kind = d.slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
     where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
     since = "" if d.since is None else f" from {d.since:.0f} s on"
-    remedy = _REMEDIES.get(d.cause, "")
-    return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since, cause=d.cause, remedy=remedy)
+    return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since)
 
 
 def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:

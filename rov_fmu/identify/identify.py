@@ -20,7 +20,6 @@ from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_f
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.progress import OnAnswer, ProgressReport
 from rov_fmu.identify.result import (
     ALARM,
@@ -118,8 +117,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         times=command_times(fit),
     )
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
-    for n, axis in enumerate(known.fitted):
-        work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
+    for axis in known.fitted:
         axes.append(_axis(found, tests, fit, vehicle, coefficients, axis, tested[axis], predicted, points))
     found = replace(found, disturbances=tuple(largest(slow)))
     of_file = found.vehicle
@@ -164,9 +162,7 @@ def _axis(
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]
-    limits = tests.description.tables.limits
     is_other = assess.differs(fit.objective.table, fit.ends, axis, tested)
-    shown = replace(fit.posterior, z=fit.file.posterior.z)
     result = AxisResult(
         axis=axis,
         answers=answers,
@@ -174,9 +170,6 @@ def _axis(
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
         points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
-        next_test=next_test(fit.objective, shown, axis, limits, answers, tested)
-        if answers and not fit.has_ended
-        else None,
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio,
         soon=fit.structure[axis].soon,

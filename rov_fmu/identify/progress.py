@@ -30,7 +30,6 @@ _STAGES = {
     HYPOTHESES: (0.30, 2.5),
     REFINED: (0.09, 1.0),
     "predicting what was left out": (0.15, 6.0),
-    "what to measure next": (0.015, 2.0),
 }
 """The stages in their order, each with its usual share of the work, and the number of steps in which 63 % of it are
 done, because nothing tells how many steps there will be. The numbers are about the means over recorded logs."""

@@ -316,8 +316,6 @@ class Disturbance(IdentifiedEffect):
     since: float | None = None
     """From when on it exceeds twice its own uncertainty, s after the start of the log; None if it does so from the
     start, or comes and goes."""
-    cause: str = ""
-    """The channel that explains it in words, such as `the voltage`; empty if none does."""
 
     @property
     def slow(self) -> Process:
@@ -487,26 +485,6 @@ def is_known(half_width: float) -> bool:
 
 
 @dataclass(frozen=True)
-class NextTest:
-    """The test that would narrow an axis's most uncertain answer most."""
-
-    axis: Axis
-    words: str
-    """What to do, such as `hold 0.6 for 8 s, then -0.6 for 8 s`."""
-    target: str
-    """The number that it narrows, in words, such as `the speed at 50%`."""
-    now: float
-    """The relative half-width of that number's interval."""
-    then: float
-    """The same after the test."""
-
-    @property
-    def is_useful(self) -> bool:
-        """True if the number would be known, with an interval at least a tenth narrower, and in whole percent, too."""
-        return self.then < min(0.9 * self.now, 1.0) and f"{self.then:.0%}" != f"{self.now:.0%}"
-
-
-@dataclass(frozen=True)
 class Slip:
     """A mistake of unit or sign, with which a file would fit much better."""
 
@@ -534,7 +512,6 @@ class AxisResult:
     predictions: tuple[Prediction, ...] = ()
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[MeasuredPoint, ...] = ()
-    next_test: NextTest | None = None
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
     structure: float = 0.0
@@ -570,8 +547,8 @@ class AxisResult:
 
     @property
     def unknown(self) -> list[Disturbance]:
-        """What is unknown: the disturbances without a cause."""
-        return [d for d in self.disturbances if d.kept and not d.cause]
+        """What is unknown: the disturbances with strong evidence."""
+        return [d for d in self.disturbances if d.kept]
 
     @property
     def unusual(self) -> list[IdentifiedEffect]:

@@ -5,11 +5,9 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 """
 
 import os
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -158,34 +156,6 @@ class Dive(Strict):
     """The files whose times come from another clock than the times of the commands."""
 
 
-def _as_fraction(value: object) -> object:
-    """Return a text in percent as a fraction."""
-    percent = re.fullmatch(r"\s*([0-9.]+)\s*%\s*", value) if isinstance(value, str) else None
-    return float(percent[1]) / 100.0 if percent else value
-
-
-class TankLimits(Strict):
-    """The table [limits]: the limits of a proposed test."""
-
-    tank_length: Annotated[
-        Finite, rule("must be the length of the tank in m, above 0", lambda length: length > 0.0)
-    ] = inf
-    """The longest distance along surge, sway or heave, m."""
-    command_max: Annotated[
-        Finite,
-        BeforeValidator(_as_fraction),
-        rule(
-            'must be above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes',
-            lambda fraction: 0.0 < fraction <= 1.0,
-        ),
-    ] = 1.0
-    """The strongest command, a fraction of the full command."""
-    duration: Annotated[
-        Finite, rule("must be the duration of a test in s, above 0", lambda duration: duration > 0.0)
-    ] = inf
-    """The longest recording, s."""
-
-
 def _check_quantities(names: tuple[str, ...]) -> tuple[str, ...]:
     """Check the names of quantities, each of which may begin with a minus."""
     for name in names:
@@ -240,8 +210,6 @@ class RovTables(Tables):
     """The dives of several files, by name."""
     logs: LogKeys = LogKeys()
     """What the logs do not tell."""
-    limits: TankLimits = TankLimits()
-    """The most that a proposed test may take."""
 
     @property
     def has_wrench(self) -> bool:

@@ -15,7 +15,6 @@ from rov_fmu.identify.findings import (
     by_heading,
     extrapolated,
     findings_of,
-    next_tests,
     prediction_name,
     repairs,
     result_sentences,
@@ -28,7 +27,6 @@ from rov_fmu.identify.result import (
     IdentifiedEffect,
     Logging,
     MeasuredPoint,
-    NextTest,
     Slip,
     Structure,
     UnknownForce,
@@ -296,13 +294,6 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         None,
     ),
     (
-        "explained disturbance",
-        disturbance(cause="the distance", since=1.1),
-        "surge: a slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 1 s on. It follows the distance"
-        ", as when a tether pulls",
-        disturbance("slow gain"),
-    ),
-    (
         "coupling left out",
         with_channels("heading", "surge velocity"),
         "dive.csv: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and Munk",
@@ -439,35 +430,12 @@ def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
     assert found == (("command", 0.0, 0.6), ("u", 0.29, 0.51), ("z", 1.05, 10.9))
 
 
-def test_the_next_tests_begin_with_the_widest_interval() -> None:
-    tests = [
-        NextTest(axis, f"do {n}", "the speed at 50%", now, 0.1)
-        for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 1.5), (YAW, 0.1)))
-    ]
-    axes = [replace(one, next_test=test) for one, test in zip(example().axes, tests, strict=True)]
-    assert next_tests(replace(example(), axes=tuple(axes))) == [
-        "heave: do 1. The speed at 50%, now not known, becomes ±10%.",
-        "surge: do 0. The speed at 50%, now ±20%, becomes ±10%.",
-    ]
-    only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
-    fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
-    nothing = "no single test would make an interval up to half command a tenth narrower."
-    widest = nothing + " The widest is that of {}: the speed at 50%, {}."
-    assert not replace(tests[0], now=0.034, then=0.026).is_useful, "both are told as 3 %"
-    assert not replace(tests[0], now=9.0, then=1.1).is_useful, "the speed is not known before and after it"
-    useless = [replace(axis, next_test=replace(test, then=test.now)) for axis, test in zip(axes, tests, strict=True)]
-    assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", "not known")]
-    assert next_tests(fine) == [widest.format("yaw", "±10%")]
-    assert next_tests(odd)[0].startswith("first repair what disagrees, and identify again")
-    assert next_tests(three()) == []
-
-
 def three(**changes: Any) -> Identification:
     """The quiet result of three logs, whose surge velocity is predicted with an error of 0.1 m/s in each."""
     files = (*FILES, "log_3.csv")
     (axis,) = surge(predictions=tuple(prediction(SURGE, "surge velocity", file) for file in files)).axes
     folder = replace(quiet().folder, logs=[*map(log, files)])
-    return quiet(**{"axes": (replace(axis, next_test=None),), "folder": folder, **changes})
+    return quiet(**{"axes": (axis,), "folder": folder, **changes})
 
 
 def two() -> Identification:

@@ -443,10 +443,6 @@ TABLES = {**FORCES, **responses(TRUTH, HEAVE)}
         (f"{KNOWN}[priors]\nthrst = 0.0\n", TABLES, "priors.thrst"),
         (f"{KNOWN}[priors]\nthrust = -1.0\n", TABLES, "priors.thrust"),
         (f"{KNOWN}[priors]\nwhite_noise = 0\n", TABLES, "priors.white_noise = 0: must be above 0"),
-        (f"{KNOWN}[limits]\ntank_length = 0\n", TABLES, "limits.tank_length = 0: must be the length of the tank"),
-        (f"{KNOWN}[limits]\ncommand_max = 50\n", TABLES, "limits.command_max = 50: must be above 0 and at most 1"),
-        (f'{KNOWN}[limits]\ncommand_max = "120 %"\n', TABLES, "limits.command_max = '120 %': must be above 0 and at"),
-        (f"{KNOWN}[limits]\nduration = -1.0\n", TABLES, "limits.duration = -1.0: must be the duration of a test"),
     ],
 )
 def test_a_folder_that_cannot_be_used_is_one_line(

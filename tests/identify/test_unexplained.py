@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.special import logsumexp
-from scipy.stats import norm
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.filter import FilterRun
 from rov_fmu.identify.likelihood.fit import fit_all
@@ -19,7 +17,6 @@ from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total_information
 from rov_fmu.identify.result import KEPT
-from rov_fmu.identify.unexplained.causes import _evidence, _Piece, cause_of, independent
 from rov_fmu.identify.unexplained.disturbances import acting_since, disturbances, followed
 from rov_fmu.tank.arrays import Array
 from tests.folders import HEAD, folder_of
@@ -73,46 +70,6 @@ OTHER = 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
 """What nothing explains."""
 
 
-def cause(objective: Objective, values: Array, axis: Axis | None = SURGE, time_constant: float = 8.0) -> str:
-    """Return what a slow process with these values follows."""
-    states, slow = objective.filters[0].vehicle_states, SLOW["slow force" if axis else "slow gain"]
-    (index,) = objective.filters[0].indices_of(slow.acts_as, axis.name if axis else "")
-    course = {states.index(name): some for name, some in (("x", NORTH), ("y", EAST), ("psi", HEADING))}
-    run = run_with(objective, {**course, index: centred(values) + OTHER})
-    return cause_of(objective, objective.mean, [run], replace(slow, time_constant=time_constant), axis)
-
-
-@pytest.mark.parametrize("name", CAUSES)
-def test_a_cause_is_named_where_a_slow_force_follows_it(name: str, objective: Objective) -> None:
-    assert cause(objective, CAUSES[name]) == name
-    assert not cause(objective, CAUSES[name], time_constant=34.0), "the dive has less than three of them"
-
-
-def test_no_cause_is_named_where_none_is_clear(objective: Objective) -> None:
-    assert not cause(objective, np.cumsum(OTHER))
-    assert not cause(objective, centred(DEPTH) + 0.75 * centred(ROLL))
-
-
-def test_a_change_of_all_thrust_follows_the_largest_command_and_the_voltage_itself(objective: Objective) -> None:
-    assert cause(objective, np.abs(COMMAND), None) == "the command"
-    assert cause(objective, VOLTAGE, None) == "the voltage"
-
-
-def test_a_cause_is_weighed_by_the_integrals_over_its_size_and_over_that_of_the_rest() -> None:
-    """The size has a normal prior as wide as the process; the rest is as probable at each logarithm of its size."""
-    rng, n = np.random.default_rng(4), 200
-    cause, time = rng.normal(size=n), np.array([1e3 * k for k in range(n)])
-    values = 0.3 * (cause - cause.mean()) + rng.normal(size=n)
-    piece = _Piece(time, values, {"the depth": cause})
-    k, s = np.linspace(-1.0, 1.5, 401)[:, None], np.exp(np.linspace(-0.7, 0.7, 401))
-    off = values[:, None, None] - k * (cause - cause.mean())[:, None, None]
-    likelihood = -n * np.log(s) - 0.5 * np.sum(off**2, axis=0) / s**2
-    of_size = norm.logpdf(k, 0.0, np.sqrt(np.sum(values**2) / np.sum((cause - cause.mean()) ** 2)))
-    none = logsumexp(likelihood[np.argmin(np.abs(k))])
-    ratio = logsumexp(likelihood + of_size) + np.log(k[1, 0] - k[0, 0]) - none
-    assert _evidence([piece], "the depth", 1.0, n) == pytest.approx(2.0 * ratio, abs=0.2)
-
-
 @pytest.mark.parametrize(
     ("evidence", "names"),
     [
@@ -129,18 +86,6 @@ def test_an_explanation_is_much_better_than_none_and_others_are_nearly_as_good(
 ) -> None:
     """Something else is as probable before as all that is on the list, however long the list is."""
     assert "".join(best_explanations(evidence)) == names
-
-
-def test_independent_values_are_those_of_the_whole_correlation() -> None:
-    """At any times, by linear algebra with the correlation of all pairs; a gap of years costs nothing."""
-    rng = np.random.default_rng(3)
-    time, values = np.cumsum(rng.exponential(1.0, 40)), rng.normal(size=40)
-    correlation = np.exp(-np.abs(time[:, None] - time) / 5.0)
-    expected = np.linalg.solve(np.linalg.cholesky(correlation), values)
-    assert independent(time, values, 5.0) == pytest.approx(expected)
-    apart = independent(time + 1e9 * (np.arange(40) >= 20), values, 5.0)
-    assert apart[20] == values[20]
-    assert apart[21:] == pytest.approx(expected[21:], rel=1e-4)
 
 
 def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:

@@ -49,7 +49,7 @@ def test_the_progress_names_what_is_done_and_never_goes_back(
         assert all(before <= after for before, after in pairwise(shares))
         assert not shares or (shares[0] == 0.0 and shares[-1] < 1.0)
     steps = [step for step, _ in begun["identifying the vehicle"]]
-    assert {"reading the logs", "start 1", "all samples", "exact derivatives", "what to measure next of heave"} <= {
+    assert {"reading the logs", "start 1", "all samples", "exact derivatives", "predicting what was left out"} <= {
         *steps
     }
 

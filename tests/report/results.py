@@ -24,7 +24,6 @@ from rov_fmu.identify.result import (
     IdentifiedEffect,
     Logging,
     MeasuredPoint,
-    NextTest,
     Prediction,
     SensorNoise,
     Slip,
@@ -93,9 +92,8 @@ def axis_result(
         ),
         MeasuredPoint(axis.name, "Tau", "s", "times.csv", 0.5, 1.1, 1.0, 1.0, counts=False),
     )
-    next_test = NextTest(axis, "hold 0.6 for 8 s, then -0.6 for 8 s", "V_ss at 50 %", 2.0 * share, share)
     own = tuple(replace(answer, axis=axis) for answer in answers(scale, share))
-    return AxisResult(axis, verdict, own, (0.7, 0.7), known, tuple(predictions), points, next_test)
+    return AxisResult(axis, verdict, own, (0.7, 0.7), known, tuple(predictions), points)
 
 
 GOOD = Verdict("good", ("The bands contain 95 % of the unseen data",))

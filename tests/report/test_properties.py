@@ -2,7 +2,7 @@
 
 import pytest
 
-from rov_fmu.equation.forces import effects_of, forces_of
+from rov_fmu.equation.forces import forces_of
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.report.page.equations import equations_of
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -43,7 +43,7 @@ class Drags:
         return Motions(of, *self.powers.get(axis.name, ()))
 
 
-def forces(vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
+def forces_of_curve(vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
     """Return the steady thrust of all thrusters that a curve describes together, for m commands, N.
 
     It is m x n if the coefficients of the vehicle are arrays of n values.

@@ -65,10 +65,10 @@ class Process:
     """Its name in a table."""
     acts_as: Action
     sentence: str
-    """What it does, with `unknown` (`an unknown` or, with a cause, `a`), `push` (`force` or `torque`), its `size`, and
+    """What it does, with `push` (`force` or `torque`), its `size`, and
     the `share` of the `thrust` (or `torque`) that this is."""
     finding: str
-    """The kind of the finding about one without a cause."""
+    """The kind of the finding about one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -465,7 +465,7 @@ KINDS = {
             8.0,
             "Slow force",
             "force",
-            "{unknown} slow {push} of {size} (RMS), {share} of the {thrust}, acts",
+            "an unknown slow {push} of {size} (RMS), {share} of the {thrust}, acts",
             "unknown force",
         ),
         0.001,
@@ -516,7 +516,7 @@ KINDS = {
             8.0,
             "Velocity over ground",
             "velocity",
-            "{unknown} slow velocity over ground of {size} (RMS) acts",
+            "an unknown slow velocity over ground of {size} (RMS) acts",
             "velocity over ground",
         ),
         0.001,

@@ -28,7 +28,7 @@ from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.likelihood.curves import Drags, forces, measured_time_constant
+from rov_fmu.identify.likelihood.curves import Drags, forces_of_curve, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, FilterRun
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table, table_of
 from rov_fmu.identify.likelihood.prior import Prior
@@ -90,7 +90,7 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Drags, least_la
     for subject, indices in grouped((row.subject, n) for n, row in enumerate(rows)).items():
         commands = np.array([rows[n].command for n in indices])
         if isinstance(subject, Curve):
-            found |= zip(indices, forces(vehicle, subject, commands), strict=True)
+            found |= zip(indices, forces_of_curve(vehicle, subject, commands), strict=True)
             continue
         motions = shapes.motions(vehicle, subject, commands)
         V_ss, Tau = motions.response()

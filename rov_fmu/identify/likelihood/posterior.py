@@ -90,10 +90,6 @@ class Posterior:
         data = self._inverse - prior
         return self.of(self.table, self.z, 2.0 * (prior + data / np.outer(factors, factors)), self.absent)
 
-    def with_more(self, information: Array) -> "Posterior":
-        """Return the posterior that more data lead to, by the second derivatives that they add to J."""
-        return self.of(self.table, self.z, 2.0 * self._inverse + information, self.absent)
-
     @property
     def _inverse(self) -> Array:
         """The inverse of the covariance; 0 for what has no error, because it is fixed or absent."""

@@ -14,9 +14,9 @@ from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior, around
 from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
-from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
+from rov_fmu.tank.clocks import held
 
 _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
@@ -48,12 +48,7 @@ def disturbances(
         if p.kind in SLOW:
             gain, error = _evidence(objective, best, index, _STEPS if refines else 1), float(posterior.errors[index])
             in_logs = [_disturbance(objective, n, best.z, p, runs, gain, error) for n in range(len(runs))]
-            present = [one for one in in_logs if one and (one.axis is None or one.axis in fitted)]
-            if present:
-                first, slow, cause = present[0], SLOW[p.kind], ""
-                if first.kept and slow.acts_as != "velocity":  # nobody knows what a velocity over ground follows
-                    cause = cause_of(objective, best.z, runs, slow, first.axis)
-                yield from (replace(one, cause=cause) for one in present)
+            yield from (one for one in in_logs if one and (one.axis is None or one.axis in fitted))
 
 
 def largest(some: Iterable[Disturbance]) -> Iterator[Disturbance]:
@@ -95,6 +90,17 @@ def _evidence(objective: Objective, best: Minimum, index: int, steps: int) -> fl
         return gain(end)
     except DivergedError:
         return inf
+
+
+def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis: Axis | None) -> Array:
+    """Return the thrust along an axis that the model commands, N or N m; without an axis, the largest command."""
+    sampled, record = objective.logs[number], objective.records[number]
+    inputs = held(record.told, record.inputs, time)
+    names = [*sampled.layout.inputs]
+    if axis is None:
+        thrusters = [names.index(f"u_{thruster.name}") for thruster in sampled.layout.thrusters]
+        return np.asarray(np.max(np.abs(inputs[:, thrusters]), axis=1))
+    return sampled.thrust(objective.table.coefficients(z), inputs)[:, sampled.layout.bare_axes.index(axis)]
 
 
 def _disturbance(

@@ -139,7 +139,7 @@ def read_result(result: Identification, truths: Truths, predictions: Sequence[Pr
             *((effect.kind, effect.of, effect.value) for effect in result.effects if effect.kept),
             *((one.kind, one.of, one.value if isfinite(one.value) else 0.0) for one in result.structures),
         ),
-        tuple((d.axis.name if d.axis else "thrust", d.cause) for d in result.disturbances if d.kept),
+        tuple((d.axis.name if d.axis else "thrust", "") for d in result.disturbances if d.kept),
         {each.axis.name: each.verdict.word for each in result.axes},
         tuple(map(_band, predictions)),
         seconds=seconds,

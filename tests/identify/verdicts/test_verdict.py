@@ -49,7 +49,6 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "An unknown slow force of 1.0 N (RMS), 6% of the thrust, acts in log.csv.",
         ),
         ({"disturbances": [replace(FORCE, evidence=5.0)]}, "good", ""),
-        ({"disturbances": [replace(FORCE, cause="the distance")]}, "good", ""),
         (
             {"disturbances": [replace(FORCE, share=0.02), replace(FORCE, axis=YAW, share=0.04)]},
             "do not use",
