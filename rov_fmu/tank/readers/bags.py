@@ -62,9 +62,8 @@ def _read(messages: Callable[[Path, Damage], Iterator[Raw]], path: Path, named: 
     damage, unknown = Damage(), _Unknown()
     content = read_messages(path, _decoded(messages(path, damage), named, unknown), named)
     content.unread |= unknown.described()
-    if (damage.is_cut or damage.pieces) and not (content.unread or any(piece.topics for piece in content.pieces)):
+    if damage.is_cut and not (content.unread or any(piece.topics for piece in content.pieces)):
         raise ValueError("it has no whole message")
-    content.count("damaged pieces", damage.pieces)
     if damage.is_cut:
         content.add_cut()
     return content

