@@ -13,7 +13,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
-from rov_fmu.tank.quality import checked_log, jumps, uninterrupted
+from rov_fmu.tank.quality import checked_log, uninterrupted
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import rows_of
@@ -192,16 +192,6 @@ def test_an_attitude_jumps_by_its_rotation_also_where_the_bow_is_vertical(turned
         assert float(size) == pytest.approx(abs(turned), abs=3.0)
         assert float(time) == pytest.approx(TIME[at + 1])
         assert len(pieces) == 2
-
-
-@pytest.mark.parametrize(("jump", "at"), [(0.8, [160]), (-0.8, [160]), (0.0, [])])
-def test_a_velocity_jumps_by_what_differs_from_its_acceleration(jump: float, at: list[int]) -> None:
-    """The vehicle speeds up at 3 m/s² around the jump, and a jump is faster than twice that. A command is no jump."""
-    time = np.linspace(0.0, 39.9, 400)
-    pushed = np.clip(time - 15.5, 0.0, 1.0) - 2.0 * np.clip(time - 20.0, 0.0, 1.0) + np.clip(time - 30.0, 0.0, 1.0)
-    noise = 0.005 * np.random.default_rng(0).standard_normal(len(time))
-    values = 3.0 * pushed + noise - jump * (np.arange(len(time)) > 160)
-    assert jumps(time, values, is_velocity=True).tolist() == at
 
 
 TOE = """[vehicle]
