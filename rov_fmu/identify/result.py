@@ -76,8 +76,8 @@ CONSTANTS = {
     ),
     "far": Constant(
         100.0,
-        "fall of J by which a hypothesis waits behind one that won",
-        "590 and 690 behind swapped and reversed thrusters, else at most 33",
+        "gain of evidence that few samples ask for, where the model is wrong along all axes",
+        "590 and 690 for swapped and reversed thrusters",
     ),
     "rocking": Constant(
         0.03, "least half-width of V_ss without logged roll and pitch", "drag that waves raise by 3 to 7 %"

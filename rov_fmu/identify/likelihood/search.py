@@ -10,8 +10,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import suppress
 from dataclasses import astuple, dataclass
 from functools import cache, cached_property, reduce
-from itertools import islice
-from math import hypot, inf, isnan, log, nan, sqrt
+from math import hypot, inf, log, nan, sqrt
+from operator import itemgetter
 
 import numpy as np
 from scipy.special import chdtri
@@ -58,8 +58,8 @@ SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
 _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
-_FITTED = 3
-"""The most hypotheses that change the thrust that are fitted in a round, for each point at which J compares them."""
+_FITTED = 5
+"""The most hypotheses that change the thrust that are fitted in a round."""
 _FAR = CONSTANTS["far"].value
 """Where one has won, others are not fitted whose J is so much above its own."""
 _FORCE, _LOUD = 0.03, 1.0
@@ -538,8 +538,6 @@ class StructureSearch:
         self.now = plain
         """The fit with the hypotheses that won."""
         self.tried: dict[frozenset[Suspect], StructureFit | None] = {frozenset(): plain}
-        self.lost = dict[Suspect | None, float]()
-        """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
         self.refuted = dict[Suspect, Start]()
         """The hypotheses that were more probable than others, but do not explain the errors over 10 s."""
 
@@ -699,100 +697,44 @@ class StructureSearch:
         return sum(2.0 * log(HYPOTHESES[kind].probability / kinds.count(kind)) for kind, _ in some)
 
     def _round(self) -> list[StructureFit]:
-        """Return fits with other sets of hypotheses, where the alarm asks for them.
-
-        If one set has won by far, sets whose J falls much less before any fit wait for the next round.
-        """
-        fits, won = list[StructureFit](), -inf
-        for starts, gain in sorted(self._promising(), key=lambda one: self._rows(one[0])):
-            if gain < won - _FAR:
-                continue
-            # What explains a model that is wrong along all axes is far better, also on few samples. A set of which J
-            # promised too little before the fit has to be far better, too.
-            is_promised = gain == -inf or gain > self._least_fall(starts)
-            rise = -WINS if is_promised and not self.now.is_hopeless else _FAR
-            enough = max(one.quick for one in (self.now, *fits)) + rise
+        """Return fits with other sets of hypotheses, where the alarm asks for them."""
+        fits = list[StructureFit]()
+        for starts in self._promising():
+            # What explains a model that is wrong along all axes is far better, also on few samples.
+            enough = max(one.quick for one in (self.now, *fits)) + (_FAR if self.now.is_hopeless else -WINS)
             self.on_fit()
             fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)
-            # Without a fit, the evidence of thinned logs is not enough.
-            is_worse = fit.score < self.now.score if fit else enough < self.now.quick
-            if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():
-                self.lost[self._new(starts)] = gain
             self.tried[frozenset(starts)] = fit
-            if fit:
-                fits.append(fit)
-                if fit.score > self.now.score + _FAR:
-                    won = max(won, gain)
+            fits += [fit] if fit else []
         return fits
 
-    def _rows(self, starts: Starts) -> int:
-        """Return the number of rows of commands. Fits with many take long, and end where others explain more."""
-        return sum(len(one.record.told) for one in applied(self.plain.objective, starts, thinned=True).logs)
-
-    def _promising(self) -> Iterator[tuple[Starts, float]]:
-        """Yield the sets that are worth a fit, with the fall of J that tells so before any fit.
-
-        The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
-        """
+    def _promising(self) -> Iterator[Starts]:
+        """Yield the sets that are worth a fit: of those that change the thrust, those for which J falls most before any
+        fit, at the last one or near the means of the priors; and all others."""
         now = self.now
         predicted, filtered = now.predicted, worst(now.misfits)
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
-        for suspect in self.suspects if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
-            (kind, of), hypothesis = suspect, HYPOTHESES[suspect[0]]
-            if suspect in self.refuted or (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
-                continue
-            for some in self._smaller:
+        for (kind, of), starts in self.suspects.items():
+            hypothesis = HYPOTHESES[kind]
+            is_alarm = (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
+            for some in self._smaller if is_alarm and (kind, of) not in self.refuted else ():
                 excludes = any(
                     kinds_freed(kind) & kinds_freed(other) and (not of or {*of} & {*own}) for other, own in some
                 )
                 if len(some) < _MOST and not excludes:
-                    sets = [{**some, suspect: start} for start in self.suspects[suspect]]
+                    sets = [{**some, (kind, of): start} for start in starts]
                     (shown if hypothesis.changes_thrust else others).extend(sets)
-        shown = [some for some in shown if frozenset(some) not in self.tried]
-        if shown:
-            yield from self._ranked(shown)
-        yield from ((some, -inf) for some in others if frozenset(some) not in self.tried)
-
-    def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
-        """Yield the best sets at either of two points with the fall of J at the better one, the largest fall first.
-
-        If J falls enough for none, it is the best one alone: it may rise a little also for what is true. Of the starts
-        of one set, the best one counts. Where J rises by much at the first point, whose noise is loud, it rises more at
-        the second one.
-        """
-        now = self.now
-        points = self._rough, comparison(self.plain.objective, now.starts, now.minimum.z)
-        before = [J(now.starts) for J in points]
-
-        def fall(some: Starts, point: int) -> float:
-            found = before[point] - points[point](some)
-            return -inf if isnan(found) else found
-
-        found = [[rough, fall(some, 1) if rough > -_FAR else -inf] for some in sets for rough in [fall(some, 0)]]
-        falls = {n: some for n, some in enumerate(found) if max(some) > self._least_fall(sets[n])}
-        chosen = dict[frozenset[Suspect], int]()
-        for point in (0, 1):
-            best = dict[frozenset[Suspect], int]()
-            for n in sorted(falls, key=lambda one: falls[one][point], reverse=True):
-                if falls[n][point] > 0.0:
-                    best.setdefault(frozenset(sets[n]), n)
-            for key, n in islice(best.items(), _FITTED):
-                chosen.setdefault(key, n)
-        if not chosen:
-            others = ((n, some) for n, some in enumerate(found) if self._new(sets[n]) not in self.lost)
-            falls = {n: some for n, some in others if any(some) and max(some) > -_FAR}
-            chosen = {frozenset(sets[n]): n for n in sorted(falls, key=lambda n: max(falls[n]))[-1:]}
-        order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
-        yield from ((sets[n], fall) for fall, n in order)
-
-    def _least_fall(self, starts: Starts) -> float:
-        """Return by how much J must fall before a fit: by more than the prior asks of a set that wins, and than it did
-        before a fit that a hypothesis of the set made worse."""
-        price = self._prior(self.now.starts) - self._prior(starts)
-        return max(price, self.lost.get(self._new(starts), -inf), 0.0)
-
-    def _new(self, starts: Starts) -> Suspect | None:
-        """Return the hypothesis of a set that is not among those that won; None if there is none."""
-        return next(iter(starts.keys() - self.now.starts.keys()), None)
+        best = dict[frozenset[Suspect], tuple[float, Starts]]()
+        if shown := [some for some in shown if frozenset(some) not in self.tried]:
+            for J in (self._rough, comparison(self.plain.objective, now.starts, now.minimum.z)):
+                before = J(now.starts)
+                for some in shown:
+                    fall = float(np.nan_to_num(before - J(some), nan=-inf, neginf=-inf))
+                    best[frozenset(some)] = max(
+                        best.get(frozenset(some), (-inf, some)), (fall, some), key=itemgetter(0)
+                    )
+        ranked = sorted(best.values(), key=itemgetter(0), reverse=True)
+        yield from (some for n, (fall, some) in enumerate(ranked[:_FITTED]) if fall > 0.0 or n == 0)
+        yield from (some for some in others if frozenset(some) not in self.tried)
