@@ -14,9 +14,9 @@ from scipy.optimize import least_squares
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import AXES, PITCH, ROLL, SURGE
 from rov_fmu.equation.layout import Layout
-from rov_fmu.report.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from verification.published import Response, load_tables
 
 Table = list[tuple[str, ...]]
 

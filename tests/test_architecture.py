@@ -41,7 +41,7 @@ REFERENCES = "verification/references"
 MAY_IMPORT = {
     "rov_fmu": {"rov_fmu"},
     REFERENCES: {REFERENCES, "rov_fmu"},
-    "examples": {"examples", REFERENCES, "rov_fmu"},
+    "examples": {"examples", REFERENCES, "verification/published", "rov_fmu"},
     "verification/benchmarks": {"verification/benchmarks", REFERENCES, "rov_fmu"},
     "verification/fuzzing": {"verification/fuzzing", REFERENCES, "rov_fmu"},
     "verification/identification": {"verification/identification", REFERENCES, "rov_fmu"},
@@ -53,12 +53,13 @@ MAY_IMPORT = {
         "rov_fmu",
     },
     "tests/verification": {"tests", "tests/verification", "verification", "examples", "rov_fmu"},
-    "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", REFERENCES},
+    "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", "verification/published", REFERENCES},
     "tests": {
         "tests",
         REFERENCES,
         "verification/fresh_environment",
         "verification/identification/strangers",
+        "verification/published",
         "verification/tables",
         "rov_fmu",
     },
@@ -76,7 +77,6 @@ LARGER_FOLDERS = {
     "rov_fmu/vehicle": 13,
     "tests/tank": 13,
     "tests/tank/readers": 13,
-    "tests/report": 13,
     "tests/fmu/calls": 16,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""

@@ -52,7 +52,7 @@ TESTS = {
     "fmu_src/c/[ls]*.c": "equation/test_step.py equation/test_alone.py equation c fmu/calls",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls "
     "fmu/results/test_ballast.py",
-    "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py report/test_published.py",
+    "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py verification/test_published.py",
     "rov_fmu/equation/[cl]a*.py": "equation/table frozen/test_known_results.py docs/test_docs.py equation/test_rov.py "
     "vehicle equation",
     "rov_fmu/equation/dependencies.py": "frozen/test_known_results.py fmu/test_properties.py",

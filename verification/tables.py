@@ -11,9 +11,9 @@ from rich.table import Table
 from rov_fmu.io.messages import FileError
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
-from rov_fmu.report.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from verification.published import Cell, ResponseTable, load_tables
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -18,15 +18,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.report.plots.steps import draw_steps, from_zero, measured_step, tables_by_axis
-from rov_fmu.report.plots.svg import LIGHT, add_knots, add_legend, name_axes, saved, with_even_text
-from rov_fmu.report.published import ResponseTable
+from rov_fmu.report.plots.steps import after_step, draw_steps, from_zero
+from rov_fmu.report.plots.svg import LIGHT, LINES, add_knots, add_legend, name_axes, saved, with_even_text
 from rov_fmu.report.templates import pretty_unit
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from verification.published import ResponseTable, tables_by_axis
 
 COLUMNS = {"single": 3.5, "double": 7.16}
 """The widths of the columns of a journal, in inches: those of the IEEE (89 and 182 mm)."""
@@ -147,7 +148,7 @@ def paper_figures() -> Iterator[PaperFigure]:
 
 def _measured_taus(table: ResponseTable) -> str:
     """Return the part of a caption about the measured time constants, of which the paper has some or none."""
-    without = [command for command in _STEPS if not measured_step(table, Decimal(command)).Tau]
+    without = [command for command in _STEPS if not _measured(table, command)[1]]
     if len(without) == len(_STEPS):
         return "The paper has no measured Tau."
     missing = f"; there is none at {listed(map(str, without))} %" if without else ""
@@ -200,13 +201,30 @@ def _drag(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
 
 
 def _steps(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
-    steps = [measured_step(table, Decimal(command)) for command in _STEPS]
-    draw_steps(ax, table.axis, steps, [(k.untuned, "--"), (k, "-")])
+    commands = sorted(float(command) / 100.0 for command in _STEPS)
+    draw_steps(ax, table.axis, commands, k)
+    end, factor = ax.get_xlim()[1], in_degrees(table.axis.unit)[0]
+    t = [end * (n / 45) ** 1.5 for n in range(46)]
     looks = {"--": "non-linear model", "-": "scaled model", ":": "measured steady velocity"}
-    if any(step.Tau for step in steps):
-        looks["o"] = "measured time constant"
+    for command, role in zip(sorted(_STEPS, key=float), LINES, strict=False):
+        color, (V_ss, Tau) = LIGHT[role], _measured(table, command)
+        v = factor * np.array(after_step(k.untuned, table.axis, float(command) / 100.0, t))
+        ax.plot(t, v, "--", color=color, linewidth=1.0)
+        for V in V_ss:
+            ax.plot([0, end], [factor * V, factor * V], ":", color=color, linewidth=1.2)
+        if V_ss and Tau:
+            at = RISE * factor * (sum(V_ss) / len(V_ss))
+            ax.plot(Tau, [at] * len(Tau), "o", color=color, markersize=5.0, zorder=5)
+            looks["o"] = "measured time constant"
     for look, label in looks.items():
         ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
+
+
+def _measured(table: ResponseTable, command: float | str) -> tuple[list[float], list[float]]:
+    """Return the measured V_ss and Tau of a command, %."""
+    rows = [row.scaled for row in table.rows if row.command == Decimal(command)]
+    V_ss = [float(row.V_ss.measured) for row in rows if row.V_ss.measured is not None]
+    return V_ss, [float(row.Tau.measured) for row in rows if row.Tau.measured is not None]
 
 
 def _curve(

@@ -151,11 +151,10 @@ class Chart {
     /** What it says: its title with the present value, and words beside it. */
     this.title = "";
     this.words = "";
-    /** Where it marks Tau and the measured point, in px. */
+    /** Where it marks Tau, in px. */
     /** @type {number[] | null} */
     this.Tau = null;
     /** @type {number[] | null} */
-    this.point = null;
     this.fit();
   }
 
@@ -173,7 +172,7 @@ class Chart {
     const { ink, blue, orange, page, muted } = board.colours;
     const { axis } = this.panel;
     const traces = this.panel.traces.filter(({ kind }) => ghost || kind !== "ghost");
-    const { time, test } = flight;
+    const { time } = flight;
     const start = Math.max(0, time - span);
     const marked = axis !== undefined && !flight.steering();
     const isSecondLine = board.width < 300 && (marked || flight.replay !== null || pointed !== null);
@@ -182,12 +181,7 @@ class Chart {
     const { factor = 1 } = this.panel;
     const [steady, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
     const V = marked && flight.floats(axis, steady) ? 0 : factor * steady;
-    const published =
-      marked && test?.axis === axis && test.V !== null
-        ? { V: factor * (test.command < 0 ? -test.V : test.V), Tau: test.Tau }
-        : null;
-    const windows = traces.map(({ times }) => [placeOf(times, start), placeOf(times, time)]);
-    const levels = axis === undefined ? [] : [0, V, published?.V ?? 0];
+    const levels = axis === undefined ? [] : [0, V];
     const [low, high, step] = rangeOf(levels, traces, windows, bottom - top);
     const px = (/** @type {number} */ t) => Math.max(left, left + ((t - start) / span) * (right - left));
     const share = (/** @type {number} */ v) => (v - low) / (high - low);
@@ -206,14 +200,11 @@ class Chart {
       [right, py(v)],
     ];
     if (hasSteady) board.line(level(px(since.time), V), ink, 1, [9, 4, 2, 4]);
-    if (published) board.line(level(left, published.V), orange, 1.5, [2, 3]);
     const p = 1 - Math.exp(-1);
     const inside = (/** @type {number} */ t, /** @type {number} */ v) =>
       px(t) <= right && t >= start ? [px(t), py(v)] : null;
     this.Tau = hasSteady && fromRest ? inside(since.time + Tau, p * V) : null;
-    this.point = published?.Tau ? inside(published.Tau, p * published.V) : null;
     if (this.Tau) board.circle(this.Tau[0], this.Tau[1], 4, page, blue);
-    if (this.point) board.circle(this.point[0], this.point[1], 4.5, orange);
     const at = pointed === null ? time : start + pointed * span;
     const isPointed = pointed !== null && at <= time;
     if (isPointed)

@@ -458,7 +458,7 @@ class Live {
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
     this.paused = false;
     this.say(
-      `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${Number((factorOf(axis) * test.V).toPrecision(3))} ${unitOf(axis, false)}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
+      `${name} ${Math.round(test.command * 100)} % from rest.`,
     );
     this.show();
   }
@@ -678,7 +678,7 @@ class Live {
     const { model } = flight.pilot;
     const all = this.charts.flatMap(({ panel }) => panel.traces);
     part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis === undefined);
-    part("measured").hidden = !flight.test && !all.some(({ kind }) => kind === "measured");
+    part("measured").hidden = !all.some(({ kind }) => kind === "measured");
     part("banded").hidden = !all.some(({ band }) => band);
     part("grey").hidden = !flight.ghostShown;
     const untested = vehicle.commands.filter((name) => isBeyond(vehicle, model.get(name)));

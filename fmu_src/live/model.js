@@ -43,8 +43,8 @@
  * @typedef {{force: string, commands: string[], label: string, at: Vector, along: Vector, most: number}} Thruster
  */
 /**
- * A published step test: a command along an axis from rest, with the measured V_ss and Tau.
- * @typedef {{axis: number, command: number, V: number | null, Tau: number | null}} StepTest
+ * A step test: a command along an axis from rest.
+ * @typedef {{axis: number, command: number}} StepTest
  */
 /**
  * An autopilot: its samples in a second, the rate of yaw by a full stick (rad/s, 0: the stick is a force), the axes that it holds, what the

@@ -19,12 +19,12 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification, IdentifiedEffect, coverage_of
-from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT, ROOT, Capsys
 from tests.docs.test_docs import STOPPING, run, runnable
 from tests.vehicles import at_rest, still
+from verification.published import load_tables
 
 TANK, DIVE = (ROOT / "docs" / f"tutorial-{name}.md" for name in ("tank-tests", "dive-log"))
 
@@ -136,7 +136,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     errors = [rov.estimates[name].error for name in ("a_d_u", "b_d_u")]
     expected.append(f"{a:.1f} ± {errors[0]:.1f} N·s²/m² and linear drag {b:.1f} ± {errors[1]:.1f} N·s/m")
     assert [error / value for error, value in zip(errors, (a, b), strict=True)] == pytest.approx([0.25, 0.25], abs=0.04)
-    measured = tables_by_axis(load_vehicle(VIDEORAY))["surge"].steady
+    measured = {table.axis.name: table for table in load_tables(load_vehicle(VIDEORAY))}["surge"].steady
     (first, slowest), *_, (last, fastest) = measured.items()
     expected.append(f"{slowest} m/s to {fastest} m/s at {first} % to {last} %")
     off = [float(V) / rov.response(SURGE, float(command) / 100.0)[0] - 1.0 for command, V in measured.items()]

@@ -13,11 +13,11 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import SEVERITY, result_sentences
 from rov_fmu.io.messages import FileError
-from rov_fmu.report.published import load_tables
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from tests.commands import TESTS
 from tests.folders import rows_of
+from verification.published import load_tables
 
 
 @pytest.fixture

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, Decimal
+from decimal import Decimal
 from functools import partial
 from itertools import groupby
-from math import isclose, isfinite
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -28,16 +28,12 @@ from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import scenes
 from rov_fmu.report.plots.steps import (
-    Step,
     draw_curve,
     draw_steps,
     from_zero,
     held_commands,
-    measured_step,
-    tables_by_axis,
 )
 from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes, shade
-from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.steady import speed_table
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -67,12 +63,10 @@ def documentation_page(
     """Return the page as HTML, for the native FMU of a version of FMI or for the FMU in pure Python.
 
     `interface` is one of INTERFACES; the FMU in pure Python has only Co-Simulation, whatever it says. `module` is the
-    model as WebAssembly; without it the page has no live section. The page of a vehicle without a data folder has no
-    tables and no measurements. Raises FileError.
+    model as WebAssembly; without it the page has no live section. Raises FileError.
     """
     layout = vehicle.layout
-    tables = tables_by_axis(vehicle)
-    held = held_commands(vehicle, tables.values())
+    held = held_commands(vehicle)
     first = vehicle.shown_axis
     driven = [axis for axis in layout.bare_axes if layout.signs(axis)]
     told = [axis for axis in driven if axis not in vehicle.unidentified]
@@ -97,7 +91,6 @@ def documentation_page(
         equations=[*equations_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         live=live([FlyingVehicle(vehicle, module)]) if module and layout.actuators else None,
-        tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
         first=first,
@@ -114,14 +107,14 @@ def documentation_page(
         steady=[
             _plot(
                 f"V_ss over the command: {a.name}",
-                partial(plot_steady, vehicle=vehicle, axis=a, table=tables.get(a.name)),
+                partial(plot_steady, vehicle=vehicle, axis=a),
             )
             for a in told
         ],
         steps=[
             _plot(
                 f"Step responses: {a.name}",
-                partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
+                partial(plot_steps, vehicle=vehicle, axis=a, commands=held),
             )
             for a in told
         ],
@@ -164,34 +157,6 @@ def differs_by_direction(vehicle: Vehicle, axis: Axis) -> bool:
     return False
 
 
-def _agreement(table: ResponseTable) -> dict[str, Any]:
-    """Compare the printed cells of a table with the computed ones.
-
-    Returns how many are printed, how many of these are the computed value rounded or cut off, and the cell that
-    deviates most, with its quantity and command.
-    """
-    cells = [
-        (cell, f"{model} {quantity}", row.command)
-        for row in table.rows
-        for model, response in (("non-linear", row.non_linear), ("scaled", row.scaled))
-        for quantity, cell in (("V_ss", response.V_ss), ("Tau", response.Tau))
-        if cell.printed is not None
-    ]
-    return {
-        "printed": len(cells),
-        "rounded": sum(cell.rounds_to_printed for cell, *_ in cells),
-        "cut_off": sum(_is_cut_off(cell) for cell, *_ in cells),
-        "farthest": max(cells, key=lambda c: abs(c[0].from_printed or 0.0), default=None),
-    }
-
-
-def _is_cut_off(cell: Cell) -> bool:
-    """Return True if the printed value was truncated instead of rounded."""
-    if cell.printed is None or cell.rounds_to_printed or not isfinite(cell.computed):
-        return False
-    return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
-
-
 def _is_tuned(vehicle: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
     return any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
@@ -200,8 +165,8 @@ def _is_tuned(vehicle: Vehicle) -> bool:
 # ---- Plots ---------------------------------------------------------------------------------------------------------
 
 
-def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
-    """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
+def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis) -> None:
+    """Plot V_ss over the command with and without tuning, and the range of valid commands."""
     low = 100.0 * vehicle.command_range[0]
     astern, ahead = (100.0 * end for end in vehicle.tested_along(axis))
     factor, unit = in_degrees(axis.unit)
@@ -218,22 +183,17 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
         V_ss = [factor * model.response(axis, c / 100.0)[0] for c in commands]
         name = label if len(models) > 1 else None
         ax.plot(commands, V_ss, dashes, label=name, color=LIGHT[color], linewidth=1.8)
-    if table and table.steady:
-        points = [(float(c), factor * float(V)) for c, V in table.steady.items()]
-        ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
     name_axes(ax, f"steady {axis.name} velocity", unit, "command (%)")
     from_zero(ax)
     ax.set_xlim(least, 100)
 
 
-def plot_steps(
-    ax: Axes, vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None
-) -> None:
-    """Plot the velocity after steps of the command from rest, with the measured V_ss and Tau."""
-    steps = [measured_step(table, c) for c in commands]
+def plot_steps(ax: Axes, vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> None:
+    """Plot the velocity after steps of the command from rest."""
+    steps = [float(c) / 100.0 for c in commands]
     if differs_by_direction(vehicle, axis):
-        steps += [Step(-step.command) for step in steps]
-    draw_steps(ax, axis, steps, [(vehicle, "-")])
+        steps += [-c for c in steps]
+    draw_steps(ax, axis, steps, vehicle)
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:

@@ -25,7 +25,7 @@ from rov_fmu.equation.parts import Thruster
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.report.plots.geometry import size_of, thruster_place
-from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
+from rov_fmu.report.plots.steps import held_commands
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
 from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, LogColumn, columns_of_log
@@ -335,14 +335,10 @@ def _label(vehicle: Vehicle, thruster: Thruster) -> str:
 
 
 def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
-    """Yield the published step tests of each axis; without any, steps of the commands that the page plots."""
-    tables = tables_by_axis(vehicle)
-    for n, form in enumerate(vehicle.layout.axes):
-        table = tables.get(form.axis.name)
-        for command in [row.command for row in table.rows] if table else held_commands(vehicle, ()):
-            step = measured_step(table, command)
-            V, Tau = (values[0] if values else None for values in (step.V_ss, step.Tau))
-            yield {"axis": n, "command": step.command, "V": V, "Tau": Tau}
+    """Yield, for each axis, steps of the commands that the page plots."""
+    for n in range(len(vehicle.layout.axes)):
+        for command in held_commands(vehicle):
+            yield {"axis": n, "command": float(command) / 100.0}
 
 
 def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:

@@ -1,7 +1,6 @@
-"""Plots that the pages share: thrust curves, and steps of the command from rest, modelled and measured."""
+"""Plots that the pages share: thrust curves, and steps of the command from rest."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from decimal import Decimal
 from math import ceil, isfinite
 from typing import TypeVar
@@ -10,12 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes, shade
-from rov_fmu.report.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = TypeVar("Number", float, Decimal)
@@ -30,44 +27,16 @@ _DEEP = 1e4
 """The depth from which no step reaches the surface, m."""
 
 
-@dataclass(frozen=True)
-class Step:
-    """A command (fraction of the full command) that is held from rest, and the measurements of the response."""
-
-    command: float
-    V_ss: Sequence[float] = ()
-    """The measured steady velocities, m/s or rad/s."""
-    Tau: Sequence[float] = ()
-    """The measured time constants, s."""
-
-
-def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
-    """Return the step to a command (%) with the measurements in the published table."""
-    rows = [row.scaled for row in table.rows if row.command == command] if table else []
-    V_ss = [float(row.V_ss.measured) for row in rows if row.V_ss.measured is not None]
-    Tau = [float(row.Tau.measured) for row in rows if row.Tau.measured is not None]
-    return Step(float(command) / 100.0, V_ss, Tau)
-
-
 def evenly(commands: Sequence[Number]) -> list[Number]:
     """Return up to four of the commands, evenly spaced from the first to the last."""
     return sorted({commands[round((len(commands) - 1) * n / (_MOST - 1))] for n in range(_MOST)})
 
 
-def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
-    """Return the published tables of a vehicle by axis; there are none without a data folder. Raises DataFileError."""
-    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
-
-
-def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
-    """Return up to four commands (%) for the step responses: commands of all tables, or else multiples of 10."""
-    rows = [{row.command for row in table.rows} for table in tables]
-    common = sorted(set.intersection(*rows)) if rows else []
-    if len(common) < 2:
-        low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
-        tens = range(-(-low // 10) * 10, high + 1, 10)
-        common = [Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))]
-    return evenly(common)
+def held_commands(vehicle: Vehicle) -> list[Decimal]:
+    """Return up to four commands (%) for the step responses: multiples of 10, as far as the vehicle has them."""
+    low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
+    tens = range(-(-low // 10) * 10, high + 1, 10)
+    return evenly([Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))])
 
 
 def from_zero(ax: Axes) -> None:
@@ -109,33 +78,22 @@ def after_step(vehicle: Vehicle, axis: Axis, command: float, times: Sequence[flo
     return velocity
 
 
-def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Vehicle, str]]) -> None:
-    """Plot the velocity after steps of the command for every model, and label the curve of the last model with the
-    command.
-
-    A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.
-    """
-    Taus = [models[-1][0].response(axis, step.command)[1] for step in steps]
-    Taus += [Tau for step in steps for Tau in step.Tau]
+def draw_steps(ax: Axes, axis: Axis, commands: Sequence[float], vehicle: Vehicle) -> None:
+    """Plot the velocity after steps of the command, and label each curve with its command."""
+    Taus = [vehicle.response(axis, command)[1] for command in commands]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
     t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
     factor, unit = in_degrees(axis.unit)
-    roles = dict(zip(sorted({abs(step.command) for step in steps}), LINES, strict=False))
+    roles = dict(zip(sorted(set(map(abs, commands))), LINES, strict=False))
     ends: list[tuple[float, str, str]] = []
-    for step in steps:
-        color = LIGHT[roles[abs(step.command)]]
-        for vehicle, dashes in models:
-            v = factor * np.array(after_step(vehicle, axis, step.command, t))
-            ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
-        ends.append((float(v[-1]), f"{100.0 * step.command:g} %".replace("-", "−"), color))
-        for V in step.V_ss:
-            ax.plot([0, end], [factor * V, factor * V], ":", color=color, linewidth=1.2)
-        if step.V_ss:
-            at = RISE * factor * (sum(step.V_ss) / len(step.V_ss))
-            ax.plot(step.Tau, [at] * len(step.Tau), "o", color=color, markersize=5.0, zorder=5)
+    for command in commands:
+        color = LIGHT[roles[abs(command)]]
+        v = factor * np.array(after_step(vehicle, axis, command, t))
+        ax.plot(t, v, "-", color=color, linewidth=1.8)
+        ends.append((float(v[-1]), f"{100.0 * command:g} %".replace("-", "−"), color))
     name_axes(ax, f"{axis.name} velocity after a step", unit, "time (s)", gap=_LABELS)
     ax.set_xlim(0, end)
-    if all(step.command >= 0.0 for step in steps):
+    if all(command >= 0.0 for command in commands):
         ax.set_ylim(bottom=0.0)
     _label(ax, ends)
 

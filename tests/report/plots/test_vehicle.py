@@ -17,7 +17,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.report.page.fmu_page import plot_steps
 from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import scenes, thruster_place
-from rov_fmu.report.plots.steps import held_commands, tables_by_axis
+from rov_fmu.report.plots.steps import held_commands
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
 
@@ -82,7 +82,7 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says() -> None:
 
 def test_names_of_lines_near_each_other_do_not_overlap_and_a_scale_is_in_knots() -> None:
     """A knot is 1852 m in an hour."""
-    steps = panel(plot_steps, HEAVY, HEAVE, [*map(Decimal, (10, 12, 100))], None)
+    steps = panel(plot_steps, HEAVY, HEAVE, [*map(Decimal, (10, 12, 100))])
     assert [text.get_text() for text in steps.texts] == ["−100 %", "−12 %", "−10 %", "10 %", "12 %", "100 %"]
     boxes = [text.get_window_extent() for text in steps.texts]
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
@@ -92,12 +92,11 @@ def test_names_of_lines_near_each_other_do_not_overlap_and_a_scale_is_in_knots()
     assert knots.get_ylim() == pytest.approx([end * 3600.0 / 1852.0 for end in steps.get_ylim()])
 
 
-def test_step_responses_have_commands_of_all_tables_or_even_tens() -> None:
+def test_step_responses_have_even_tens() -> None:
     for ends, commands in {
         (0.1, 1.0): (10, 40, 70, 100),
         (0.2, 0.7): (20, 40, 50, 70),
         (0.001, 0.002): (1,),
         (0.41, 0.48): (41, 43, 46, 48),
     }.items():
-        assert held_commands(replace(VIDEORAY, command_range=ends), ()) == [*map(Decimal, commands)]
-    assert held_commands(VIDEORAY, tables_by_axis(VIDEORAY).values()) == [*map(Decimal, (20, 30, 50, 70))]
+        assert held_commands(replace(VIDEORAY, command_range=ends)) == [*map(Decimal, commands)]

@@ -114,6 +114,11 @@ def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
     return tuple(_load_table(vehicle.data, vehicle, test) for test in STEP_TESTS)
 
 
+def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
+    """Return the published tables of a vehicle by axis; there are none without a data folder. Raises DataFileError."""
+    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
+
+
 def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
     """Return the rows of a CSV file by command in %, with None for empty cells. `units` has the other columns."""
     columns = {name: Column({unit: 1.0}, blanks=True) for name, unit in units.items()}

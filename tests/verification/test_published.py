@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.report.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
 from tests.paper.test_paper import NON_LINEAR, ROWS, SCALED, closed_form
 from tests.vehicles import with_axes
+from verification.published import Cell, ResponseTable, load_tables
 
 DATA = VIDEORAY.parent / "tables"
 MODELS = {"non_linear": NON_LINEAR, "scaled": SCALED}
