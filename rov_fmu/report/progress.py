@@ -6,13 +6,10 @@ end the result shows, and one at least every ten seconds. First answers stand ab
 each replaces the last one, and get a line each in a pipe.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
 from functools import partial
-from math import exp
 from threading import Event, Lock, Thread
 from time import perf_counter
 from typing import Any
@@ -23,10 +20,10 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     SpinnerColumn,
-    Task,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
+    TimeRemainingColumn,
 )
 from rich.table import Column
 from rich.text import Text
@@ -44,21 +41,15 @@ _TELLING = 0.05
 """The share of the work from which the time that is left is told."""
 
 
+@dataclass
 class _Running:
     """A part that is running."""
 
-    def __init__(self, name: str) -> None:
-        self.words, self.began = name, perf_counter()
-        self.task: TaskID | None = None
-        """Its line on a terminal."""
-        self._share, self._at, self._goes_on = 0.0, self.began, True
-
-    def reach(self, words: str, share: float, *, goes_on: bool) -> None:
-        """Take the step that the part is at, the share that is done, and whether more is being done."""
-        self._goes_on = goes_on
-        if share > self._share:
-            self._share, self._at = share, perf_counter()
-        self.words = words
+    words: str
+    task: TaskID | None
+    """Its line on a terminal."""
+    began: float
+    share: float = 0.0
 
     @property
     def so_far(self) -> float:
@@ -67,14 +58,8 @@ class _Running:
 
     @property
     def left(self) -> float | None:
-        """For how long it will be running, s; None as long as too little is done, and while nothing is done.
-
-        It follows from the time in which the share was done, and becomes smaller until the next share is done. Even
-        where this takes longer than all that was left, something is left.
-        """
-        is_known = self._goes_on and self._share > _TELLING
-        left = (self._at - self.began) * (1.0 / self._share - 1.0) if is_known else 0.0
-        return left * exp((self._at - perf_counter()) / left) if left else None
+        """For how long it will be running, as fast as so far, s; None as long as too little is done."""
+        return self.so_far * (1.0 / self.share - 1.0) if self.share > _TELLING else None
 
 
 class Parts:
@@ -90,11 +75,9 @@ class Parts:
         for name in [*self._running]:
             self.end(name)
         for name in names:
-            running = _Running(name)
-            if self._display:
-                running.task = self._display.add_task(one_line(name), total=1.0, count="", running=running)
+            task = self._display.add_task(one_line(name), total=1.0, count="") if self._display else None
             with self._lock:
-                self._running[name] = running
+                self._running[name] = _Running(name, task, perf_counter())
         return partial(self.show, names[-1])
 
     def end(self, name: str) -> None:
@@ -106,16 +89,13 @@ class Parts:
         else:
             self.print(f"{name}: done in {running.so_far:.1f} s")
 
-    def show(self, name: str, step: str, share: float, count: str = "", *, goes_on: bool = True) -> None:
-        """Show the step of a running part, and the share that is done or, if given, a count.
-
-        `goes_on` is False while nothing is done, so that nobody knows how long it will take.
-        """
-        running, words = self._running[name], count or f"{share:.0%}"
+    def show(self, name: str, step: str, share: float, count: str = "") -> None:
+        """Show the step of a running part, and the share that is done or, if given, a count."""
+        running, count = self._running[name], count or f"{share:.0%}"
         with self._lock:
-            running.reach(f"{step}, {words}", share, goes_on=goes_on)
+            running.words, running.share = f"{step}, {count}", share
         if self._display and running.task is not None:
-            self._display.update(running.task, completed=min(share, 0.999), description=one_line(step), count=words)
+            self._display.update(running.task, completed=min(share, 0.999), description=one_line(step), count=count)
 
     def tell(self, subject: str, answer: str) -> None:
         """Show the answer about a subject that is known so far. On a terminal, it replaces the one before."""
@@ -143,14 +123,6 @@ class Parts:
             lines = [(running.words, running.so_far, running.left) for running in self._running.values()]
         for words, so_far, left in lines:
             self.print(f"{words} ({so_far:.0f} s so far{'' if left is None else f', about {left:.0f} s left'})")
-
-
-class _Left(ProgressColumn):
-    """The time that is left, as a pipe gets it."""
-
-    def render(self, task: Task) -> Text:
-        left = None if task.finished else task.fields["running"].left
-        return Text("" if left is None else str(timedelta(seconds=round(left))), style="progress.remaining")
 
 
 class Display(Progress):
@@ -188,7 +160,7 @@ def parts() -> Iterator[Parts]:
         BarColumn(bar_width=12),
         TextColumn("{task.fields[count]}", markup=False),
         TimeElapsedColumn(),
-        _Left(),
+        TimeRemainingColumn(),
     )
     display = Display(*columns, console=out, transient=True, expand=True)
     display.start()
@@ -238,34 +210,20 @@ class StudyParts:
     def __init__(self, shown: Parts) -> None:
         self._parts = shown
         shown.begin("starting the study")
-        self._reports = deque[tuple[float, int]]()
-        """The time of each report of the last ten seconds, and of the one before, with the number of runs done."""
-        self._done_before = 0
-        self._result = 0.0
-        """The time of the latest result, or of the first report."""
+        self._began, self._before = 0.0, -1
+        """The time of the first report, and the runs that were done then."""
 
     def update(self, now: StudyProgress) -> None:
         """Show how many runs are done and failed."""
-        time, reports = perf_counter(), self._reports
-        if not reports:
+        if self._before < 0:
             self._parts.begin("runs")
-            self._done_before, self._result = now.done, time
-        elif now.done > reports[-1][1]:
-            self._result = time
-        reports.append((time, now.done))
-        if len(reports) == 1:
+            self._began, self._before = perf_counter(), now.done
             return
-        while reports[1][0] <= time - _EVERY:
-            reports.popleft()
-        began, before = reports[0]
-        goes_on = now.done > before
-        if goes_on:
-            speed = per_second((now.done - before) / max(time - began, 1e-3))
-        else:
-            speed = f"{time - self._result:.0f} s without a result"
-        words = f"{speed}{f', {now.failed:,} failed' if now.failed else ''}"
-        share = (now.done - self._done_before) / max(now.total - self._done_before, 1)
-        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs", goes_on=goes_on)
+        done, time = now.done - self._before, perf_counter() - self._began
+        words = per_second(done / max(time, 1e-3))
+        words += f", {now.failed:,} failed" if now.failed else ""
+        share = done / max(now.total - self._before, 1)
+        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs")
 
 
 def per_second(rate: float) -> str:
