@@ -2,36 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
 from pathlib import Path
 
 import tomlkit
 
 from rov_fmu.equation.catalogue import EXTERNAL
-from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.inspection.undetermined import undetermined
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
-from rov_fmu.io.toml_file import Toml
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, read_rov_file
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, read_rov_file
 from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
 from rov_fmu.tank.inspection.draft import (
-    Guess,
     LikelyVehicle,
     completed,
     dives,
     draft,
-    is_open,
     lacking,
     likely_vehicle,
 )
 from rov_fmu.tank.inspection.headers import TableHeaders, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
-from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, Moved, moved
+from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, moved
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.listing import Listing, list_files, named
 from rov_fmu.tank.readers.parsers import one_parser
@@ -140,19 +135,13 @@ def inspect_paths(paths: Sequence[Path]) -> Inspected:
     headers = headers_of_tables(folder)
     likely = likely_vehicle(inspections, headers.curves)
     own = read_text(path, VehicleFileError).strip() if path.exists() else ""
-    document = tomlkit.parse(own).unwrap()
-    if "thruster" in document:
+    if "thruster" in tomlkit.parse(own):
         likely = replace(likely, base="")
     name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
-    is_known = likely.base or not is_open(document.get("base", "?")) or not EXTERNAL.isdisjoint(likely.thrusters)
-    found = NOTHING_MOVED if is_known else moved(_dives(path, inspections))
-    has_vehicle = is_described or _has_form_of_paper(described, likely)
-    for _ in range(2):  # thrusters that are completed tell which axes they drive
-        text = draft(name, inspections, headers, likely, _guess(found, described.description, document))
-        lacks = lacking(own, text, has_vehicle=has_vehicle) if own else text
-        if not (lacks and path.exists()):
-            break
-        # What is told is about the file that it will be.
+    is_known = own or likely.base or not EXTERNAL.isdisjoint(likely.thrusters)
+    text = draft(name, inspections, headers, likely, NOTHING_MOVED if is_known else moved(_dives(path, inspections)))
+    lacks = lacking(own, text) if own else text
+    if lacks and path.exists():  # what is told is about the file that it will be
         described = read_rov_file(path, draft=Draft(completed(own, lacks), ""))
     notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
@@ -184,23 +173,3 @@ def _dives(path: Path, inspections: Sequence[Inspection]) -> list[Log]:
         parts = [by_name[name] for name in joined.get(log.file, ()) if by_name.get(name)]
         logs.append(together(path.with_name(log.file), parts) if len(parts) > 1 else log)
     return logs
-
-
-def _guess(found: Moved, description: Description | None, own: Toml) -> Guess:
-    """Return what the logs tell of a vehicle that has no base: what its thrusters move, and its size by its mass.
-
-    Thrusters that rov.toml describes tell themselves which axes they drive. `own` is its content, which may have
-    mistakes.
-    """
-    if description and description.has_hardware_tables:
-        found = replace(found, driven=frozenset(description.logged.bare_axes))
-    mass: object = own
-    for key in ("body", "m_rov", "value"):
-        mass = mass.get(key) if isinstance(mass, dict) else None
-    return Guess(found, float(mass) if isinstance(mass, int | float) and 0.0 < mass < inf else None)
-
-
-def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:
-    """Return True if a rov.toml that has no vehicle stands for that of the paper, and the logs do not contradict it."""
-    layout = described.description.layout if described.description else Layout((), (), ())
-    return {*likely.thrusters} <= {thruster.name for thruster in layout.thrusters} | {COMMAND}

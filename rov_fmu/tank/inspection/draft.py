@@ -5,10 +5,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
 
 import tomlkit
-from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.equation.parts import SourcedVector
@@ -27,23 +25,6 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 
 _HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "known", "against")
 """The tables and keys of a draft that describe the vehicle. A rov.toml that has a vehicle needs none of them."""
-
-
-@dataclass(frozen=True)
-class Guess:
-    """What nobody has told of a vehicle, but logs and its mass let guess."""
-
-    moved: Moved = NOTHING_MOVED
-    mass: float | None = None
-    """m_rov, kg, where rov.toml tells it."""
-
-    @property
-    def inertia(self) -> str:
-        """The moment of inertia about the vertical axis in words, kg m²; empty without a mass."""
-        return f"{self.mass * RADIUS**2:.2g}" if self.mass else ""
-
-
-NO_GUESS = Guess()
 
 
 @dataclass(frozen=True)
@@ -80,7 +61,7 @@ def draft(
     inspections: Sequence[Inspection],
     tables: TableHeaders,
     likely: LikelyVehicle,
-    guess: Guess = NO_GUESS,
+    found: Moved = NOTHING_MOVED,
     *,
     asks: bool = True,
 ) -> str:
@@ -108,8 +89,7 @@ def draft(
         identifier=f"rov_{word}".rstrip("_") if why_no_identifier(word) else word,
         curves=tables.curves or ["all"],
         tables=tables,
-        moved=guess.moved,
-        inertia=guess.inertia,
+        moved=found,
         vector=_vector,
         usual=GUESSED,
         radius=RADIUS,
@@ -123,144 +103,22 @@ def draft(
     )
 
 
-def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
-    """Return the tables and keys of a draft that a rov.toml lacks, as TOML. Both texts must be TOML.
-
-    A value with a `"?"` is lacking if the draft has one without. Where the file has the vehicle of the logs, nothing
-    else is added to one with a base, and only the mass and the axes to one with thrusters, so that what a user has
-    described stays as it is.
-    """
-    document, more = tomlkit.parse(own).unwrap(), tomlkit.parse(draft)
-    is_undecided = is_open(document.get("base"))
-    has_vehicle = has_vehicle or "thruster" in document or ("base" in document and not is_undecided)
-    tables = {name: value for name, value in document.items() if isinstance(value, dict)}
-    body = {"m_rov", *(["I_r"] if "yaw" in tables.get("axes", {}) else [])} if "thruster" in document else {*()}
-    body -= {*tables.get("body", {}), *tables.get("known", {})}
-    dives = [dive.get("files") for dive in tables.get("dives", {}).values() if isinstance(dive, dict)]
-    files = [name for names in dives if isinstance(names, list) for name in names]
-    told = tomlkit.document()
-    for name, table in more.items():
-        there, is_described = document.get(name, {}), has_vehicle and name in _HARDWARE
-        if isinstance(table, AoT) and name in document:
-            if thrusters := _lacking_thrusters(there, table):
-                told.add(name, thrusters)
-        elif not isinstance(table, AbstractTable) and (
-            _is_told(there, table) if name in document else not is_described
-        ):
+def lacking(own: str, draft: str) -> str:
+    """Return the tables of a draft that a rov.toml lacks, as TOML; of those about the vehicle, only a base."""
+    there, told = tomlkit.parse(own), tomlkit.document()
+    left_out = {*there, *_HARDWARE} - ({"base"} if there.keys().isdisjoint(_HARDWARE) else {*()})
+    for name, table in tomlkit.parse(draft).items():
+        if name not in left_out:
             told.add(name, table)
-        if not isinstance(table, AbstractTable) or not isinstance(there, dict):
-            continue
-        keys = {
-            key: value
-            for key, value in table.items()
-            if key not in there or (not isinstance(value, Table) and _is_told(there[key], value))
-        }
-        if is_described:
-            added = {"body": body, "axes": table if "thruster" in document else ()}.get(name, ())
-            keys = {key: value for key, value in keys.items() if key in there or key in added}
-        if name == "dives":  # a dive of the same files may have any name
-            keys = {key: value for key, value in keys.items() if not any(file in files for file in value["files"])}
-        if keys:
-            told.add(name, rest := tomlkit.table())
-            for key, value in keys.items():
-                rest.add(key, value)
     return tomlkit.dumps(told).strip()
 
 
-def is_open(value: object) -> bool:
-    """Return True for a value with a `"?"`, which the owner has to decide."""
-    if isinstance(value, Mapping | list):
-        return any(map(is_open, value.values() if isinstance(value, Mapping) else value))
-    return value == "?"
-
-
-def _is_told(own: object, value: object) -> bool:
-    """Return True if a draft tells what a file leaves open."""
-    return is_open(own) and not is_open(value)
-
-
-def _lacking_thrusters(own: object, draft: AoT) -> AoT | None:
-    """Return the thrusters of a draft that a file leaves open, with the keys that it lacks, and those that it has not,
-    as long as it leaves others open; None if it lacks nothing."""
-    if not isinstance(own, list) or not is_open(own):
-        return None
-    by_name = _by_name(own)
-    told = tomlkit.aot()
-    for thruster in draft:
-        there = by_name.get(thruster["name"])
-        keys = {
-            key: value
-            for key, value in thruster.items()
-            if there is None or _is_told(there.get(key), value) or (key not in there and is_open([*there.values()]))
-        }
-        if keys:
-            told.append(rest := tomlkit.table())
-            for key, value in ({"name": thruster["name"]} | keys).items():
-                rest.add(key, value)
-    return told or None
-
-
-def _by_name(thrusters: Iterable[Any]) -> dict[str, Any]:
-    """Return thrusters by their names, without those that have none."""
-    tables = (one for one in thrusters if isinstance(one, Mapping))
-    return {one["name"]: one for one in tables if isinstance(one.get("name"), str)}
-
-
 def completed(own: str, lacks: str) -> str:
-    """Return a rov.toml with the tables and keys that it lacks. What was there stays as it is, except a `"?"`."""
+    """Return a rov.toml, which stays as it is, with the keys that it lacks before it, and the tables behind it."""
     if not own:
         return lacks
-    document, more = tomlkit.parse(own), tomlkit.parse(lacks)
-    head, tables = "", tomlkit.document()
-    if "thruster" in more and is_open(document.get("base")):
-        comment = document["base"].trivia.comment
-        head = f"{comment}\n" if comment else ""
-        del document["base"]
-    for name, item in more.items():
-        if name not in document and isinstance(item, AbstractTable | AoT):
-            tables.add(name, item)
-        elif name not in document:
-            head += f"{name} = {item.as_string()}\n"
-        elif isinstance(item, AoT):
-            _complete_thrusters(document[name], item)
-        elif not isinstance(item, AbstractTable):
-            _put(document, name, item)
-        else:
-            there = document[name]
-            for key, value in item.items():
-                if key in there or isinstance(there, InlineTable) or not isinstance(value, Table):
-                    _put(there, key, value)
-                else:  # keys without a header may follow the other tables of this one
-                    tables.setdefault(name, tomlkit.table(is_super_table=True)).add(key, value)
-    text = f"{head}{tomlkit.dumps(document)}"
-    return f"{text.rstrip()}\n\n{tomlkit.dumps(tables).strip()}".strip() + "\n"
-
-
-def _put(table: Any, key: str, value: Any) -> None:
-    """Give a key a value, which keeps the comment that is there, and is inline in an inline table."""
-    there = table.get(key)
-    if isinstance(table, InlineTable):
-        table[key] = value.unwrap()
-        return
-    table[key] = value
-    if there is not None and not value.trivia.comment.startswith(there.trivia.comment):
-        added = value.trivia.comment.removeprefix("#").strip()
-        value.trivia.comment = there.trivia.comment + (f"; {added}" if added not in there.trivia.comment else "")
-        value.trivia.comment_ws = there.trivia.comment_ws
-
-
-def _complete_thrusters(own: Any, more: AoT) -> None:
-    """Give thrusters in any form the keys that they lack, and add those that are not there."""
-    by_name = _by_name(own)
-    for thruster in more:
-        if there := by_name.get(thruster["name"]):
-            for key, value in thruster.items():
-                if key != "name":
-                    _put(there, key, value)
-        elif isinstance(own, AoT):
-            own.append(thruster)
-        else:
-            own.append(thruster.unwrap())  # becomes an inline table
+    keys, mark, tables = f"\n{lacks}".partition("\n[")
+    return f"{keys}\n{own}\n{mark}{tables}".strip() + "\n"
 
 
 def _vector(vector: SourcedVector | None) -> str:

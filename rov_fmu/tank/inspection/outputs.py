@@ -48,8 +48,6 @@ class Moved:
     """The axes that the logs show."""
     by_output: Mapping[str, Mapping[Axis, float]]
     """The axes that each output clearly moves, with the accelerations."""
-    driven: frozenset[Axis] | None = None
-    """The axes along which known thrusters push alone; None where the outputs have to tell it."""
 
     @cached_property
     def thrusters(self) -> dict[str, Thruster]:
@@ -59,18 +57,18 @@ class Moved:
 
     @cached_property
     def pushed(self) -> frozenset[Axis]:
-        """The axes along which thrusters push alone, as they are known or guessed."""
-        if self.driven is not None or not self.thrusters:
-            return self.driven or frozenset()
+        """The axes along which the guessed thrusters push alone."""
+        if not self.thrusters:
+            return frozenset()
         layout = Layout(tuple(VehicleAxis(axis) for axis in GUESSED), (), tuple(self.thrusters.values()))
         return frozenset(GUESSED) - dict(undriven_axes(layout)).keys()
 
     @property
     def undriven(self) -> list[Axis]:
         """The axes along which no output pushes alone; none where the outputs do not tell."""
-        if self.driven is None and len(self.thrusters) < max(len(self.by_output), 1):
+        if len(self.thrusters) < max(len(self.by_output), 1):
             return []
-        driven = {axis for effects in self.by_output.values() for axis in effects} if self.driven is None else GUESSED
+        driven = {axis for effects in self.by_output.values() for axis in effects}
         return [axis for axis in GUESSED if axis not in self.pushed or (axis in self.shown and axis not in driven)]
 
     def _thruster(self, name: str, effects: Mapping[Axis, float]) -> Thruster | None:
