@@ -23,7 +23,6 @@ READING: dict[str, tuple[str, str]] = {
     "the vehicle of a build": ("videoray.toml", "build {f}/videoray.toml"),
     "the vehicle to tune": ("videoray.toml", "tune {f}/videoray.toml --axis=heave --command=0.3 --v-ss=0.2"),
     "the points": ("points.csv", "tune {f}/videoray.toml --axis=heave --points {f}/points.csv"),
-    "a table of a build": ("tables/table3_heave_steady.csv", "build {f}/videoray.toml"),
     "a drawing": ("pictures/from_above.svg", "build {f}/videoray.toml"),
     "a drawing of the FMU in Python": (
         "pictures/from_starboard.svg",
@@ -175,7 +174,7 @@ def test_what_may_not_be_read_is_one_line_that_names_it(
     (tmp_path / "temporary").mkdir()
     commands, locked = [], []
     files = [(READING[case][0], 0, case) for case in cases]
-    folders = [("tests", mode, "rov.toml") for mode in modes] + [("tables", 0o000, "a table of a build")]
+    folders = [("tests", mode, "rov.toml") for mode in modes] + [("pictures", 0o000, "a drawing")]
     for n, (name, mode, case) in enumerate([*files, *folders]):
         folder = Path(shutil.copytree(copied, tmp_path / str(n)))
         locked.append(folder / name)

@@ -1,15 +1,18 @@
 """The messages in the files of recorders: bags of ROS 1 (.bag) and ROS 2 (.db3), and MCAP.
 
-A recorder that loses its power leaves an MCAP file or a database that ends amid a message: what is before it is read.
+A recorder that loses its power leaves a file that ends amid a message or a chunk: what is before it is read.
 """
 
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from io import BytesIO
+from os import SEEK_CUR
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
+from typing import BinaryIO
 
 ZSTD = b"\x28\xb5\x2f\xfd"
 """The first bytes of what zstd compressed. A message of ROS 2 begins with 0."""
@@ -71,17 +74,38 @@ def mcap_messages(path: Path, damage: Damage) -> Iterator[Raw]:
                 yield streams[record.channel_id], record.log_time, record.data
 
 
-def bag_messages(path: Path, _: Damage) -> Iterator[Raw]:
-    """Yield the messages of a bag of ROS 1 in the order of time. Raises ReaderError for one without an index."""
-    from rosbags.rosbag1 import Reader
+def bag_messages(path: Path, damage: Damage) -> Iterator[Raw]:
+    """Yield the messages of a bag of ROS 1 in their order in the file, up to a damage. It needs no index."""
+    from rosbags.rosbag1.reader import Header, RecordType, decompressors, read_bytes, read_uint32
 
-    with Reader(path) as reader:
-        streams = {
-            one.id: Stream(one.topic, one.msgtype.replace("/msg/", "/"), "ros1", "ros1msg", one.msgdef.data.encode())
-            for one in reader.connections
-        }
-        for connection, time, raw in reader.messages():
-            yield streams[connection.id], time, raw
+    streams: dict[int, Stream] = {}
+
+    def records(file: BinaryIO) -> Iterator[Raw]:
+        while file.read(1):
+            file.seek(-1, SEEK_CUR)
+            head = Header.read(file)
+            kind = head.get_uint8("op")
+            if kind == RecordType.CONNECTION:
+                more = Header.read(file)
+                own = more.get_string("type"), "ros1", "ros1msg", more["message_definition"]
+                streams[head.get_uint32("conn")] = Stream(head.get_string("topic"), *own)
+                continue
+            data = read_bytes(file, read_uint32(file))
+            if kind == RecordType.CHUNK:
+                yield from records(BytesIO(decompressors[head.get_string("compression")](data)))
+            elif kind == RecordType.MSGDATA:
+                yield streams[head.get_uint32("conn")], head.get_time("time"), data
+            elif kind == RecordType.BAGHEADER:
+                damage.is_cut = not head.get_uint64("index_pos")
+
+    with path.open("rb") as file:
+        file.readline()
+        try:
+            yield from records(file)
+        except MemoryError:
+            raise
+        except Exception:  # the library and its decompressors raise many kinds
+            damage.is_cut = True
 
 
 def database_messages(path: Path, damage: Damage) -> Iterator[Raw]:
