@@ -36,8 +36,6 @@ FREE_DECAY = "free decay"
 """The kind of the finding about a log in which a vehicle slows down without thrust."""
 _CALM = 0.3
 """The standard deviation of an unknown velocity at the start, m/s or rad/s."""
-_ANYWHERE = 100.0
-"""The standard deviation of an unknown horizontal position at the start, m."""
 _LEVEL = 0.1
 """The standard deviation of an unknown angle at the start, rad."""
 _LEAST_CHANGE = 0.001
