@@ -195,6 +195,8 @@ class RovTables(Tables):
     windows: dict[str, _Window] = Field(default={})
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
+    limits: Any = None
+    """What next tests had to keep to. Files that have it are read, and nothing uses it."""
     fit: Requests = Requests()
     priors: dict[str, _Deviation] = Field(default={})
     """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
