@@ -19,6 +19,7 @@ from click.shell_completion import CompletionItem
 from rov_fmu import __version__
 from rov_fmu.c.compile import BACKENDS, FMI_VERSIONS, INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.equation.catalogue import AXES
+from rov_fmu.interface.export_command import EXPORTS, export
 from rov_fmu.io.messages import (
     FileError,
     InputError,
@@ -540,17 +541,13 @@ _option_of = partial(click.option, cls=_OptionOf)
     "--to",
     required=True,
     is_eager=True,
-    type=_Choice(
-        ["mujoco", "allocation", "autopilot", "gains", "ardusub-gains", "sdf", "urdf"],
-        {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco", "ardusub": "ardusub-gains"},
-    ),
-    help="MuJoCo, the allocation of thrust, an autopilot (FMU), its gains, those of ArduSub, Gazebo (SDFormat), or "
-    "ROS 2 (URDF).",
+    type=_Choice([*EXPORTS], {one.also: one.name for one in EXPORTS.values() if one.also}),
+    help=f"{listed((one.words for one in EXPORTS.values()), 'or')}.",
 )
 @_output_option(
     metavar="PATH",
-    help="File (sdf, urdf) or folder (others) to write. The default is the identifier with the name of the format, "
-    "such as <identifier>_mujoco or <identifier>.sdf.",
+    help="File or folder to write. The default is the identifier with the name of the format, such as "
+    "<identifier>_mujoco or <identifier>.sdf.",
 )
 @_option_of(
     "--draws",
@@ -589,10 +586,9 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
 
     The default is the VideoRay Pro 4.
     """
-    from rov_fmu.interface.export_command import export
     from rov_fmu.report.console import console, paragraph, print_end, print_table
 
-    exported = export(vehicle, to, output, **options)
+    exported, written = export(vehicle, to, output, **options)
     if exported.table:
         print_table(exported.table)
     if exported.notes:
@@ -601,7 +597,7 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
         paragraph(console(), f"- {note}")
     for warning in exported.warnings:
         _warn(warning)
-    print_end(exported.written, exported.following)
+    print_end(written, exported.following)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------

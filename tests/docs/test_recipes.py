@@ -1,7 +1,7 @@
 """The recipes of docs/extending.md, applied to a copy of the program: what they add is everywhere, or told as missing.
 
 A force with a coefficient of its own (e_d), an effect on the thrust that depends on a state (k_z), an output with a new
-unit (power), and a log format (.jsonl).
+unit (power), a log format (.jsonl), and an export (coefficients).
 """
 
 import json
@@ -100,6 +100,24 @@ from rov_fmu.tank.readers.jsonl import open_jsonl
         ),
         (_BEFORE, "    TABLE,\n)", '    Format("a file of JSON lines", rb"{", open_jsonl),\n'),
     ],
+    "interface/export_command.py": [
+        (
+            _BEFORE,
+            "\n\nEXPORTS = {",
+            """
+
+def _coefficients(job: Job) -> Exported:
+    from rov_fmu.bridges.coefficients import coefficients_json
+
+    return Exported({"coefficients.json": coefficients_json(job.vehicle)}, ["it has no equation"])
+""",
+        ),
+        (
+            _BEFORE,
+            '        Export("sdf"',
+            '        Export("coefficients", "_values", _coefficients, "its coefficients (JSON)", "json"),\n',
+        ),
+    ],
     "io/file_kinds.py": [(_BEHIND, "ULOG_SUFFIX, *BAG_SUFFIXES", ', ".jsonl"')],
 }
 """What each file gets, before or behind a text in it."""
@@ -120,9 +138,24 @@ def open_jsonl(path: Path) -> OpenStream:
     lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
     return partial(StringIO, "\\n".join(lines))
 '''
+COEFFICIENTS = '''\
+"""Write the coefficients of a vehicle as JSON."""
+
+import json
+
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+def coefficients_json(vehicle: Vehicle) -> str:
+    """Return the coefficients by their names, in SI units."""
+    return json.dumps(dict(vehicle.coefficients))
+'''
 CHECK = """
 import json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from rov_fmu.cli import main
 from rov_fmu.bridges import allocation, arrays, mujoco, sdf, urdf
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.fmu.content import native_content
@@ -168,6 +201,16 @@ found = {
     "read": [*entries],
     "suffixes": LOG_SUFFIXES,
 }
+def printed(*arguments):
+    with redirect_stdout(StringIO()) as out, redirect_stderr(out):
+        main(["export", "videoray", *arguments])
+    return out.getvalue()
+
+found |= {
+    "export": [printed("--to", "coefficients"), Path("videoray_values/coefficients.json").read_text()],
+    "refused": [printed("--to", "json"), printed("--to", "coefficients", "--world")],
+    "own": dict(base.coefficients),
+}
 swims = mujoco.load_mujoco(rov)
 swims.model.opt.timestep, swims.data.actuator("u_t").ctrl, swims.data.qvel[2] = 1e-9, inputs["u_t"], -state["w"]
 swims.step()
@@ -178,7 +221,7 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a copy of the program with the four additions says about a vehicle that has them."""
+    """What a copy of the program with the additions says about a vehicle that has them."""
     scratch = tmp_path_factory.mktemp("recipes")
     package = scratch / "rov_fmu"
     shutil.copytree(ROOT / "rov_fmu", package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -190,7 +233,8 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
             assert text.count(anchor) == 1, f"{name} has no longer {anchor!r}, which docs/extending.md describes"
             text = text.replace(anchor, f"{anchor}{new}" if where == _BEHIND else f"{new}{anchor}")
         (package / name).write_text(text, encoding="utf-8")
-    (package / "tank" / "readers" / "jsonl.py").write_text(JSONL, encoding="utf-8")
+    for name, text in {"tank/readers/jsonl.py": JSONL, "bridges/coefficients.py": COEFFICIENTS}.items():
+        (package / name).write_text(text, encoding="utf-8")
     rows = ({"time [s]": 0.1 * n, "command [%]": 30, "depth [m]": 0.01 * n} for n in range(100))
     (scratch / "dive_heave.jsonl").write_text("\n".join(map(json.dumps, rows)), encoding="utf-8")
     there = {"env": {**os.environ, "PYTHONPATH": str(scratch)}, "cwd": scratch}
@@ -236,3 +280,13 @@ def test_an_output_with_a_new_unit_is_in_every_list(found: dict[str, Any]) -> No
 def test_a_log_in_a_new_format_is_read_as_every_table_is(found: dict[str, Any]) -> None:
     assert {*found["read"]} == {"command [%]", "depth [m]"}
     assert ".jsonl" in found["suffixes"]
+
+
+def test_an_export_is_a_format_of_the_command(found: dict[str, Any]) -> None:
+    printed, content = found["export"]
+    assert json.loads(content) == found["own"]
+    assert "Note:\n- it has no equation\n" in printed
+    assert "Wrote videoray_values" in printed
+    unknown, foreign = found["refused"]
+    assert "did you mean coefficients?" in unknown
+    assert "--to coefficients: leave out --world, because only sdf has it" in foreign
