@@ -12,6 +12,7 @@ from uuid import UUID
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from rov_fmu.bridges.system.companions import _common
+from rov_fmu.bridges.system.companions._common import Companion
 from rov_fmu.equation.parts import Point
 from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.archive import archive
@@ -31,23 +32,17 @@ _PORT = port_of(Point(name="point")).names
 """The names of the members of a vehicle's port, by which a port of a companion fits it: force, place, velocity."""
 
 
-def slave_of(name: str) -> Any:
-    """Return the class of a companion. The `variables` of an object have causality, start value, unit and description.
-
-    It may also have: `terminals`, groups of variables with their name, and the names of the members if they differ;
-    `points`, the ports, whose variables end with the name of the port and are in the order of a vehicle's; `places`,
-    the terminals that each one whom it serves has for itself; `behind`, the terminal of each place to whose water it
-    adds; `nodes`, the number of points at which it feels waves; `columns`, those of its file; `limits` of parameters;
-    and `needs`, a package.
-    """
+def slave_of(name: str) -> type[Companion]:
+    """Return the class of a companion."""
     if name == AUTOPILOT:
-        return object  # it has no class in Python
-    return getattr(import_module(f"rov_fmu.bridges.system.companions.{name}"), name.capitalize())
+        return Companion  # it has no class in Python
+    found: type[Companion] = getattr(import_module(f"{_common.__package__}.{name}"), name.capitalize())
+    return found
 
 
 def lack(name: str) -> str:
     """Return why a companion cannot run here, or an empty text."""
-    needs: str = getattr(slave_of(name), "needs", "")
+    needs = slave_of(name).needs
     return f"needs {needs}: pip install 'rov-fmu[system]'" if needs and find_spec(needs) is None else ""
 
 
@@ -80,7 +75,7 @@ def companion(name: str, **shape: Any) -> bytes:
     return archive(files | python_files(slave.__name__, sources))
 
 
-def _description(made: Any, sources: Mapping[str, str]) -> bytes:
+def _description(made: Companion, sources: Mapping[str, str]) -> bytes:
     """Return PythonFMU's description, with the units and the dependencies that it does not write.
 
     No output follows an input before the step. Without the time, the same file gives the same bytes.
@@ -101,7 +96,7 @@ def _description(made: Any, sources: Mapping[str, str]) -> bytes:
         for kind in variable.iter("Real"):
             name = variable.attrib["name"]
             kind.set("unit", made.variables[name][2])
-            for key, limit in zip(("min", "max"), getattr(made, "limits", {}).get(name, ()), strict=False):
+            for key, limit in zip(("min", "max"), made.limits.get(name, ()), strict=False):
                 kind.set(key, f"{limit:.16g}")
     for output in root.iter("Unknown"):
         output.set("dependencies", "")
@@ -110,12 +105,13 @@ def _description(made: Any, sources: Mapping[str, str]) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}'.encode()
 
 
-def _terminals(made: Any) -> list[Terminal]:
+def _terminals(made: Companion) -> list[Terminal]:
     """Return the terminals of a companion: its groups of variables, and its ports with the members of a vehicle's."""
     causality = {name: causality for name, (causality, *_) in made.variables.items()}
-    groups = getattr(made, "terminals", ())
-    found = [Terminal(name, causality[own[0]], "bus", "", tuple(own), *members) for name, own, *members in groups]
-    for point in getattr(made, "points", ()):
+    found = [
+        Terminal(name, causality[own[0]], "bus", "", (*own,), (*members,)) for name, own, members in made.terminals
+    ]
+    for point in made.points:
         names = tuple(name for name in made.variables if name.endswith(f"_{point}"))[: len(_PORT)]
         found.append(Terminal(point, "port", "bus", "", names, _PORT))
     return found

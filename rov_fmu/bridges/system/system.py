@@ -15,6 +15,7 @@ from rov_fmu import __version__
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
 from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, slave_of, timed_rows
+from rov_fmu.bridges.system.companions._common import Companion
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,
     VELOCITIES,
@@ -100,7 +101,7 @@ def _parts(
     ready: dict[str, SystemFmu] = {}
     for name, table in plan.component.items():
         others = served.get(name, {})
-        is_in_waves = bool(_nodes(plan, name)) and any(f"{name}.waves" in line[:2] for line in plan.connect)
+        is_in_waves = bool(_slave(plan, name).nodes) and any(f"{name}.waves" in line[:2] for line in plan.connect)
         own = table.model_dump_json(include={*SOURCES, "file", "point", "port", "held"})
         kind = f"{own}{others}{is_in_waves}"
         try:
@@ -114,7 +115,7 @@ def _parts(
                 part = _autopilot(name, plan, path)
             else:
                 on_part(name)
-                lines = {other: nodes for other in others if (nodes := _nodes(plan, other))}
+                lines = {other: nodes for other in others if (nodes := _slave(plan, other).nodes)}
                 shape = {
                     "rows": tables.get(name),
                     "places": [other for other, suffix in others.items() if suffix and other not in lines],
@@ -156,7 +157,7 @@ def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
     found: dict[str, Rows] = {}
     for name, table in plan.component.items():
         if table.file and table.companion:
-            columns = getattr(slave_of(table.companion), "columns", ())
+            columns = slave_of(table.companion).columns
             try:
                 if not columns:
                     raise FileError(f"{path}: component.{name}.file: the companion {table.companion} takes no file")
@@ -177,35 +178,30 @@ def _served(plan: SystemPlan) -> tuple[Served, list[list[_Line]]]:
     def named(end: str, other: str) -> str:
         """Return the name of an end for whom it serves."""
         component, _, name = end.partition(".")
-        slave, nodes = _slave(plan, component), _nodes(plan, other)
-        if name == getattr(slave, "behind", None):
+        slave, nodes = _slave(plan, component), _slave(plan, other).nodes
+        if name == slave.behind:
             return f"{end}{served.get(component, {}).get(other, '')}"
-        if name not in dict(getattr(slave, "places", ())) or (nodes and name != "waves"):
+        if name not in dict(slave.places) or (nodes and name != "waves"):
             return end
         others = served.setdefault(component, {})
         return f"{end}{others.setdefault(other, f'_{other}' if nodes or '' in others.values() else '')}"
 
     slaves = {component: _slave(plan, component) for component in plan.component}
-    seas = {f"{component}.{one.behind}": component for component, one in slaves.items() if hasattr(one, "behind")}
+    seas = {f"{component}.{one.behind}": component for component, one in slaves.items() if one.behind}
     lines: list[list[_Line]] = [[] for _ in plan.connect]
     order = sorted(enumerate(plan.connect), key=lambda one: not seas.keys().isdisjoint(one[1]))  # seas last
     for n, (first, second, factor) in order:
         others = served.get(seas.get(first) or seas.get(second, ""), {})
-        for other in [name for name in others if not _nodes(plan, name)] or [""]:
+        for other in [name for name in others if not _slave(plan, name).nodes] or [""]:
             ends = (named(first, other or second.partition(".")[0]), named(second, other or first.partition(".")[0]))
             lines[n].append((*ends, factor))
     return served, lines
 
 
-def _slave(plan: SystemPlan, component: str) -> Any:
-    """Return the class of a component that is a companion, or None."""
+def _slave(plan: SystemPlan, component: str) -> type[Companion]:
+    """Return the class of a component that is a companion; of any other one, that of a companion without more."""
     table = plan.component.get(component)
-    return slave_of(table.companion) if table and table.companion else None
-
-
-def _nodes(plan: SystemPlan, component: str) -> int:
-    """Return the number of points at which a component feels waves; 0 for all but tethers."""
-    return getattr(_slave(plan, component), "nodes", 0)
+    return slave_of(table.companion) if table and table.companion else Companion
 
 
 def _autopilot(name: str, plan: SystemPlan, path: Path) -> SystemFmu:

@@ -134,7 +134,7 @@ def list_companions() -> None:
         else:
             slave = slave_of(name)(instance_name=name)
             variables = slave.variables
-            groups = [*(terminal for terminal, *_ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
+            groups = [*(terminal for terminal, *_ in slave.terminals), *slave.points]
             title += f"; {reason}" if (reason := lack(name)) else ""
             title += f". Terminals: {', '.join(groups)}" if groups else ""
         shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])

@@ -2,14 +2,16 @@
 
 import json
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Variability, Real
+from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 Variables = dict[str, tuple[str, float | bool, str, str]]
 """Causality, start value, unit and description by name."""
+Group = tuple[str, Sequence[str], Sequence[str]]
+"""The name of a group of variables, these, and the names of the members; none if these are the same."""
 LEVELS = 16
 """The levels of a profile of the water; a file may have more rows."""
 DIRECTIONS = ("northward", "eastward", "downward")
@@ -17,43 +19,58 @@ VELOCITY, ACCELERATION = ("V_N", "V_E", "V_D"), ("A_N", "A_E", "A_D")
 WATER = tuple(zip(VELOCITY, DIRECTIONS, strict=True))
 
 
-def shape_of(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return the shape of a companion, shape.json among its resources, by the arguments of its slave."""
-    file = Path(str(arguments.get("resources")), "shape.json")
-    shape: dict[str, Any] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
-    return shape
+class Companion(Fmi2Slave):  # type: ignore[misc]
+    """What a companion is, and what it has if its class says nothing else."""
 
+    description: str
+    variables: Variables
+    points: Sequence[str] = ()
+    """The ports, whose variables end with the name of the port and are in the order of a vehicle's."""
+    places: Sequence[tuple[str, Sequence[str]]] = ()
+    """The terminals that each one whom it serves has for itself; those of all but the first end with its name."""
+    behind: str | None = None
+    """The terminal of each place that takes the water to which it adds."""
+    nodes = 0
+    """The number of points at which it feels waves."""
+    columns: tuple[str, ...] = ()
+    """Those of its file, if it takes one."""
+    limits: ClassVar[dict[str, tuple[float, float]]] = {}
+    """The least and the greatest value of parameters."""
+    needs = ""
+    """A package that it imports."""
 
-def register(slave: Any, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
-    """Give a slave its variables, its author, and a default experiment with a step, s."""
-    slave.author, slave.variables = "rov-fmu", variables
-    slave.default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=step)
-    for name, (causality, start, _, text) in variables.items():
-        setattr(slave, name, start)
-        kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
-        how = Fmi2Variability[parameters if causality == "parameter" else changes]
-        slave.register_variable(kind(name, description=text, causality=Fmi2Causality[causality], variability=how))
+    def __init__(self, **arguments: object) -> None:
+        super().__init__(**arguments)
+        self.terminals: list[Group] = []
+        file = Path(str(arguments.get("resources")), "shape.json")
+        self.shape: dict[str, Any] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        """Whom and what it serves: the arguments of `companion`, which its FMU has as a resource."""
 
+    def register(self, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
+        """Take its variables, its author, and a default experiment with a step, s."""
+        self.author, self.variables = "rov-fmu", variables
+        self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=step)
+        for name, (causality, start, _, text) in variables.items():
+            setattr(self, name, start)
+            kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
+            how = Fmi2Variability[parameters if causality == "parameter" else changes]
+            self.register_variable(kind(name, description=text, causality=Fmi2Causality[causality], variability=how))
 
-def check(slave: Any) -> None:
-    """Raise ValueError if a parameter is outside of the limits that its description has as min and max."""
-    for name, (low, high) in slave.limits.items():
-        if not low <= getattr(slave, name) <= high:
-            raise ValueError(f"{name} must be from {low:g} to {high:g}: {getattr(slave, name):g}")
+    def check(self) -> None:
+        """Raise ValueError if a parameter is outside of its limits, which the description has as min and max."""
+        for name, (low, high) in self.limits.items():
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} must be from {low:g} to {high:g}: {getattr(self, name):g}")
 
-
-def add_places(slave: Any, shape: dict[str, Any], place: Callable[[str], Variables]) -> Variables:
-    """Give a slave a place in the water for each whom it serves, with the terminals `places`; return the variables.
-
-    The names of all but the first place end with the name of whom it serves.
-    """
-    slave.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
-    variables: Variables = {}
-    for suffix in slave.suffixes:
-        variables |= place(suffix)
-        for port, names in slave.places:
-            slave.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
-    return variables
+    def add_places(self, place: Callable[[str], Variables]) -> Variables:
+        """Take a place in the water for each whom it serves, with its terminals; return the variables."""
+        self.suffixes = ["", *(f"_{name}" for name in self.shape.get("places", ()))]
+        variables: Variables = {}
+        for suffix in self.suffixes:
+            variables |= place(suffix)
+            for port, names in self.places:
+                self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
+        return variables
 
 
 def profile(levels: int, causality: str) -> Variables:

@@ -8,10 +8,9 @@ a resistance. By Peukert's law, a current I empties it in the time H (C / (H I))
 from math import sqrt
 from typing import ClassVar
 
-from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.bridges.system.companions._common import Variables, check, register
+from rov_fmu.bridges.system.companions._common import Companion, Variables
 
 THRUSTS = ("F_l", "F_r", "F_t")
 
@@ -38,11 +37,10 @@ VARIABLES: Variables = {
 }
 
 
-class Battery(Fmi2Slave):  # type: ignore[misc]
+class Battery(Companion):
     """The slave. It starts full, without load."""
 
     description = "A battery: from electric power or thrusts to the voltage"
-    terminals = (("electric", ("electric_power",)), ("battery", ("voltage",)))
     limits: ClassVar = {
         "E_full": (0.01, 1e5),
         "E_empty": (0.01, 1e5),
@@ -67,11 +65,12 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        register(self, VARIABLES, step=0.05)
+        self.terminals = [("electric", ["electric_power"], ()), ("battery", ["voltage"], ())]
+        self.register(VARIABLES, step=0.05)
 
     def exit_initialization_mode(self) -> None:
         """Begin full. Raises ValueError for a battery that cannot be."""
-        check(self)
+        self.check()
         self.voltage = self.E_full
 
     def do_step(self, current_time: float, step_size: float) -> bool:  # noqa: ARG002

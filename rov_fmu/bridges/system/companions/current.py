@@ -12,18 +12,13 @@ from bisect import bisect_right
 from math import cos, sin
 from typing import ClassVar
 
-from pythonfmu import Fmi2Slave
-
 from rov_fmu.bridges.system.companions._common import (
     LEVELS,
     WATER,
+    Companion,
     Variables,
-    add_places,
     at,
-    check,
     profile,
-    register,
-    shape_of,
 )
 
 # name: causality, start, unit, description
@@ -45,15 +40,13 @@ def place(suffix: str) -> Variables:
 Rows = list[list[float]]
 
 
-class Current(Fmi2Slave):  # type: ignore[misc]
+class Current(Companion):
     """The slave. Its outputs are those of the end of a step, at the depth of the vehicle when the step began."""
 
     description = "A current that depends on depth and time"
     columns = ("time", "z", "V_N", "V_E", "V_D")
     """Those of a file, of which V_D may be left out. Its rows are those of shape.json, by their times."""
     places = (("pose", ("z",)), ("current", ("V_N", "V_E", "V_D")))
-    """The terminals that each vehicle has for itself; those of all but the first end with its name."""
-
     limits: ClassVar = {"speed": (-100.0, 100.0), "exponent": (0.0, 100.0), "rise": (0.0, 1e6), "seabed": (0.01, 1e6)}
 
     speed: float
@@ -61,21 +54,19 @@ class Current(Fmi2Slave):  # type: ignore[misc]
     exponent: float
     rise: float
     seabed: float
-    suffixes: list[str]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        shape = shape_of(arguments)
-        self.times: list[float] = [time for time, _ in shape.get("rows", ())]
-        self.profiles: list[Rows] = [rows for _, rows in shape.get("rows", ())]
-        self.levels = profile(shape.get("levels", 0), "output")
-        self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = [("profile", [*self.levels], ())]
-        places = add_places(self, shape, place)
-        register(self, place("") | VARIABLES | self.levels | places)
+        self.times: list[float] = [time for time, _ in self.shape.get("rows", ())]
+        self.profiles: list[Rows] = [rows for _, rows in self.shape.get("rows", ())]
+        self.levels = profile(self.shape.get("levels", 0), "output")
+        self.terminals = [("profile", [*self.levels], ())]
+        places = self.add_places(place)
+        self.register(place("") | VARIABLES | self.levels | places)
 
     def exit_initialization_mode(self) -> None:
         """Begin with the water at the start. Raises ValueError for a current that cannot be."""
-        check(self)
+        self.check()
         self._set(0.0)
 
     def do_step(self, current_time: float, step_size: float) -> bool:

@@ -15,17 +15,12 @@ from math import cos, exp, pi, sin, sqrt, tanh
 from random import Random
 from typing import ClassVar
 
-from pythonfmu import Fmi2Slave
-
 from rov_fmu.bridges.system.companions._common import (
     ACCELERATION,
     DIRECTIONS,
     VELOCITY,
+    Companion,
     Variables,
-    add_places,
-    check,
-    register,
-    shape_of,
 )
 
 G = 9.80665
@@ -69,14 +64,12 @@ def place(suffix: str) -> Variables:
     return found | {f"elevation{suffix}": ("output", 0.0, "m", "Elevation of the surface there, positive upward")}
 
 
-class Seaway(Fmi2Slave):  # type: ignore[misc]
+class Seaway(Companion):
     """The slave."""
 
     description = "A seaway: linear waves with a JONSWAP spectrum"
     places = (("pose", PLACE), ("current", VELOCITY), ("waves", (*ACCELERATION, "elevation")))
-    """The terminals that each vehicle has for itself; those of all but the first end with its name."""
     behind = "steady"
-    """The terminal of each place that takes the water to which the waves add."""
     limits: ClassVar = {
         "H_s": (0.0, 100.0),
         "T_p": (0.01, 1e3),
@@ -98,16 +91,15 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
     seabed: float
     rise: float
     step: float
-    suffixes: list[str]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
         self.before: dict[str, list[float]] = {}
         self.waves: list[tuple[float, ...]] = []
-        shape = shape_of(arguments)
-        self.lines = {name: [f"_{name}_{n}" for n in range(count)] for name, count in shape.get("lines", {}).items()}
-        self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = []
-        variables = place("") | VARIABLES | add_places(self, shape, place)
+        self.lines = {
+            name: [f"_{name}_{n}" for n in range(count)] for name, count in self.shape.get("lines", {}).items()
+        }
+        variables = place("") | VARIABLES | self.add_places(place)
         for suffix in self.suffixes:
             self.terminals.append((f"steady{suffix}", [f"{name}{suffix}" for name in STEADY], VELOCITY))
         for line, suffixes in self.lines.items():
@@ -116,11 +108,11 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
                 members = tuple(f"{name}_p{n}" for n in range(len(suffixes)) for name in some)
                 self.terminals.append((f"{port}_{line}", own, members))
             variables |= {name: one for suffix in suffixes for name, one in point(suffix, steady=False).items()}
-        register(self, variables, "fixed")
+        self.register(variables, "fixed")
 
     def exit_initialization_mode(self) -> None:
         """Draw the waves, and begin with the middle of the first step. Raises ValueError for a sea that cannot be."""
-        check(self)
+        self.check()
         self.waves = self._drawn()
         for suffix in self.suffixes:
             self._put(suffix, 0.5 * self.step, self._place(suffix))

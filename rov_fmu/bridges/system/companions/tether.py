@@ -17,19 +17,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import ClassVar
 
-from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from rov_fmu.bridges.system.companions._common import (
     ACCELERATION,
     DIRECTIONS,
     VELOCITY,
+    Companion,
     Variables,
     at,
-    check,
     profile,
-    register,
-    shape_of,
 )
 
 SEGMENTS, SHOWN = 20, 11  # of the line, the points of its shape
@@ -103,14 +100,13 @@ Line LineType NodeA NodeB UnstrLen NumSegs Outputs
 """
 
 
-class Tether(Fmi2Slave):  # type: ignore[misc]
+class Tether(Companion):
     """The slave."""
 
     description = "A tether between two points in flowing water (MoorDyn)"
     needs = "moordyn"
     points = tuple(ENDS)
     nodes = NODES
-    """The number of its points at which it feels waves."""
     limits: ClassVar = {
         "length": (0.01, 1e6),
         "diameter": (1e-4, 10.0),
@@ -126,15 +122,14 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
         self.system: object = None
         self.history: list[list[float]] = []
-        shape = shape_of(arguments)
-        self.levels = profile(shape.get("levels", 0), "input")
-        self.terminals = [("profile", [*self.levels])]
+        self.levels = profile(self.shape.get("levels", 0), "input")
+        self.terminals = [("profile", [*self.levels], ())]
         variables = VARIABLES | self.levels
-        if shape.get("waves"):
-            self.terminals += [("pose", [*PLACES]), ("waves", [*WAVES])]
+        if self.shape.get("waves"):
+            self.terminals += [("pose", [*PLACES], ()), ("waves", [*WAVES], ())]
             variables |= PLACES | WAVES
-        self.told = range(NODES if shape.get("waves") else 0)
-        register(self, variables, "fixed")
+        self.told = range(NODES if self.shape.get("waves") else 0)
+        self.register(variables, "fixed")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
@@ -177,7 +172,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         import moordyn
 
         self.moordyn = moordyn
-        check(self)
+        self.check()
         own = self.__dict__
         ground = own["seabed"] or levels[-1][0] or DEPTH
         for n, end in enumerate(ENDS.values()):
