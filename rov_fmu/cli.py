@@ -249,28 +249,18 @@ def _commands(context: click.Context) -> None:
     help=f"Platform to compile for: host, {', '.join(PLATFORMS)}. It may be repeated; the default is all with 64 bits.",
 )
 @_force_option()
-def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **options: Any) -> None:
+def _build(vehicle: Path, **options: Any) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
-    if backend == "pythonfmu" and platforms:
+    if options["backend"] == "pythonfmu" and options["platforms"]:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
-    from rov_fmu.build import build_fmu, chosen_platforms
+    from rov_fmu.build import build_fmu
     from rov_fmu.report.progress import compiling
     from rov_fmu.vehicle.vehicle import load_vehicle
 
     started = perf_counter()
     loaded = load_vehicle(vehicle)
-    chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
     with compiling() as (begin, done):
-        built = build_fmu(
-            loaded,
-            platforms=chosen,
-            backend=backend,
-            fmi=fmi,
-            inputs=[vehicle],
-            on_content=begin,
-            on_compiled=done,
-            **options,
-        )
+        built = build_fmu(loaded, inputs=[vehicle], on_content=begin, on_compiled=done, **options)
     _print_built(built, perf_counter() - started)
 
 

@@ -104,7 +104,8 @@ def _end_interrupted(program: str) -> None:
 
     with UNINTERRUPTED:  # no other thread begins or prints anything more
         try:
-            _print_error(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
+            clean_up_everything()
+            _print_error(program, _INTERRUPTED, 130)
         finally:
             os._exit(130)
 

@@ -13,8 +13,8 @@ UNINTERRUPTED = RLock()
 """A thread holds this lock during an action that must not be interrupted half-way.
 
 The main thread takes it and keeps it when it ends the process; see `clean_up_everything`."""
-_PENDING: list[tuple[Callable[[], object], str]] = []
-"""Functions that still have to clean up, the oldest first, each with a note for the user."""
+_PENDING: list[Callable[[], object]] = []
+"""Functions that still have to clean up, the oldest first."""
 _ATTEMPTS = 50
 """The number of attempts to remove a folder, since a thread may still be writing into it."""
 _PAUSE = 0.01
@@ -22,19 +22,15 @@ _PAUSE = 0.01
 
 
 @contextmanager
-def cleaned_up(clean: Callable[[], object], note: str = "") -> Iterator[None]:
-    """Call `clean` when the block ends, and also when an interrupt ends the process within the block.
-
-    The line about the interrupt ends with the note.
-    """
-    entry = clean, note
+def cleaned_up(clean: Callable[[], object]) -> Iterator[None]:
+    """Call `clean` when the block ends, and also when an interrupt ends the process within the block."""
     with UNINTERRUPTED:
-        _PENDING.append(entry)
+        _PENDING.append(clean)
     try:
         yield
     finally:
         with UNINTERRUPTED:
-            _PENDING.remove(entry)
+            _PENDING.remove(clean)
             clean()
 
 
@@ -53,16 +49,15 @@ def temporary_folder(prefix: str, parent: str | None = None) -> Iterator[str]:
         yield folder
 
 
-def clean_up_everything() -> list[str]:
-    """Call all pending functions, the latest first, because the process is about to end, and return their notes.
+def clean_up_everything() -> None:
+    """Call all pending functions, the latest first, because the process is about to end.
 
     The caller holds UNINTERRUPTED until the process has ended. So every other thread has finished its protected action,
     and no thread begins another one.
     """
-    for clean, _ in reversed(_PENDING):
+    for clean in reversed(_PENDING):
         with suppress(Exception):
             clean()
-    return [note for _, note in _PENDING if note]
 
 
 def _remove(folder: str) -> None:

@@ -1,10 +1,8 @@
-"""Opening, reading and hashing files; if one cannot be read, the error names it and says why."""
+"""Opening and reading files; if one cannot be read, the error names it and says why."""
 
 import errno
-import hashlib
 import os
 import stat
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,17 +12,6 @@ from rov_fmu.io.messages import NO_FILE, FileError, brief
 
 _MOST_BYTES = 1_000_000_000
 """The largest file that is read as a whole, in bytes, where nothing else is said."""
-_PIECE = 2**20
-"""The number of bytes that are hashed at a time: a file may be larger than the memory."""
-
-
-def hash_of(file: IO[bytes], kind: str, size: int = sys.maxsize) -> bytes:
-    """Return the hash of what follows in an open file, or of its first `size` bytes, of a kind that hashlib has."""
-    digest = hashlib.new(kind)
-    while piece := file.read(min(size, _PIECE)):
-        digest.update(piece)
-        size -= len(piece)
-    return digest.digest()
 
 
 @contextmanager

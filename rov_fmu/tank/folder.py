@@ -14,6 +14,7 @@ A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of
 A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
 """
 
+import hashlib
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,7 +26,7 @@ from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
 from rov_fmu.io.file_kinds import OWN_SUFFIXES, TESTS, check_suffix
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
-from rov_fmu.io.reading import hash_of, open_file
+from rov_fmu.io.reading import open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -52,6 +53,8 @@ from rov_fmu.vehicle.vehicle import VehicleFileError
 
 KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
+_PIECE = 2**20
+"""The number of bytes that are hashed at a time: a file may be larger than the memory."""
 _LACKING = {
     "columns": "no CSV file has such a column",
     "topics": "no log has such a topic and field",
@@ -497,5 +500,8 @@ def axis_in_name(path: Path) -> Axis | None:
 
 def file_hash(path: Path, kind: str = "sha3_256") -> str:
     """Return the hash of a file, of a kind that hashlib has. Raises DataFileError."""
+    digest = hashlib.new(kind)
     with open_file(path, DataFileError) as file:
-        return hash_of(file, kind).hex()
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
