@@ -3,9 +3,6 @@
 The experiments are a step of each axis from rest to its largest command, with and without the vehicle's tuning, and a
 manoeuvre of all axes, which begins tilted if the vehicle rolls or pitches. A vehicle with a surface begins deep under
 water. The expected results are computed in plain Python, and not with the C code that they prove.
-
-If coefficients have confidence intervals, further experiments repeat the manoeuvre at the ends of these intervals. They
-have no expected results, because they are there to show how uncertain the motion is.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +14,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axi
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import FOLDER, MANIFEST
-from rov_fmu.fmu.related import Related, documents, ends_of_intervals, manifest, origin
+from rov_fmu.fmu.related import Related, documents, manifest, origin
 from rov_fmu.io.messages import listed
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -70,8 +67,6 @@ class ExpectedRun:
     """The variables that the expected results may contain."""
     parameters: tuple[str, Values] | None = None
     """The name and the values of the parameters that are set; None for those of the vehicle."""
-    like: str = ""
-    """The experiment whose stimuli it has. It then has no expected results."""
 
     @property
     def stop(self) -> float:
@@ -109,9 +104,8 @@ def reference_results(vehicle: Vehicle, *, native: bool = True) -> dict[str, byt
 
     `native` is False for an FMU in pure Python, which has the solver that computes the results.
     """
-    proofs = [*map(_deep, (*_steps(vehicle), _manoeuvre(vehicle)))]
-    variants = _at_ends_of_intervals(vehicle, proofs[-1])
-    sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
+    experiments = [*map(_deep, (*_steps(vehicle), _manoeuvre(vehicle)))]
+    sets = dict(one.parameters for one in experiments if one.parameters)
     text = {
         f"{name}.ssv": render(
             "parameters.ssv.j2", name=name, values={key: repr(value) for key, value in values.items()}
@@ -123,25 +117,21 @@ def reference_results(vehicle: Vehicle, *, native: bool = True) -> dict[str, byt
         for name, words in _SETS.items()
         if name in sets
     ]
-    for one in proofs:
+    for one in experiments:
         text[f"{one.name}.csv"] = _csv(one.stimuli(), one.inputs)
         text[f"{one.name}_expected.csv"] = _csv(one.references(), one.compared)
         related.append(Related(f"{one.name}_expected.csv", "result", "text/csv", f"Expected: {one.description}"))
-    for some, name, purpose, title, words in (
-        (proofs, "experiments", "validation", "Expected results", _SECOND_SOLVER if native else _SAME_SOLVER),
-        (variants, "uncertainty", "uncertainty-analysis", "Ends of the 95 % intervals", _UNCERTAIN),
-    ):
-        if some:
-            text[f"{name}.exp"] = render(
-                "experiments.exp.j2",
-                experiments=some,
-                title=title,
-                tolerance=f"{TOLERANCE:g}",
-                steps=_STEPS,
-                seconds=_text,
-                description=f"{vehicle.name}: {words}",
-            )
-            related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
+    title = "Expected results"
+    text["experiments.exp"] = render(
+        "experiments.exp.j2",
+        experiments=experiments,
+        title=title,
+        tolerance=f"{TOLERANCE:g}",
+        steps=_STEPS,
+        seconds=_text,
+        description=f"{vehicle.name}: {_SECOND_SOLVER if native else _SAME_SOLVER}",
+    )
+    related.append(Related("experiments.exp", "experiment/validation", "application/x-ma-hs-experiments", title))
     of_origin, roles = origin(vehicle)
     files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
     return {**files, **of_origin, MANIFEST: manifest([*related, *roles, *documents(vehicle)])}
@@ -155,16 +145,13 @@ _SECOND_SOLVER = (
 _SAME_SOLVER = (
     "they come from the solver in Python that the FMU runs, too, run when the FMU was built. So they test the interface"
 )
-_UNCERTAIN = (
-    "the manoeuvre with each coefficient at an end of its 95 % interval, and the others where its correlations put them"
-)
 _SETS = {
     "tuned": "alpha and beta as identified",
     "untuned": "alpha = beta = 1: without tuning",
     "attitude": "Euler angles at the start",
     "deep": "Depth at the start",
 }
-"""The parameter sets of the experiments with expected results, in words."""
+"""The parameter sets of the experiments, in words."""
 
 
 def _deep(experiment: ExpectedRun) -> ExpectedRun:
@@ -173,21 +160,6 @@ def _deep(experiment: ExpectedRun) -> ExpectedRun:
         return experiment
     name, given = experiment.parameters or ("deep", {})
     return replace(experiment, parameters=(name, {**given, **_DEEP}))
-
-
-def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: ExpectedRun) -> list[ExpectedRun]:
-    """Return the manoeuvre with each identified coefficient at each end of its interval."""
-    _, started = manoeuvre.parameters or ("", {})
-    return [
-        replace(
-            manoeuvre,
-            name=name,
-            description=words,
-            parameters=(f"uncertainty/{name}", {**started, **values}),
-            like=manoeuvre.name,
-        )
-        for name, words, values in ends_of_intervals(vehicle)
-    ]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------

@@ -93,7 +93,7 @@ def test_the_files_have_the_form_of_the_standards(name: str) -> None:
             schema.assertValid(etree.fromstring(content))
     for title, experiment in _experiments(files).items():
         assert experiment.find("References").get("source") == f"{title}_expected.csv"
-    assert len(archive(files)) < (40_000 if name == "identified" else 25_000)
+    assert len(archive(files)) < 25_000
     check_experiments_of_axes(vehicle, files)
 
 

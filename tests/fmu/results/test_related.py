@@ -1,19 +1,13 @@
-"""The origin in an FMU: the vehicle file and the covariance."""
+"""The origin in an FMU: the vehicle file with its tables."""
 
-import csv
-import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-import tomlkit
-from lxml import etree
 
 import rov_fmu
 from rov_fmu.fmu.archive import FOLDER
-from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.related import origin
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -22,12 +16,6 @@ from tests.commands import BARE
 from tests.vehicles import THRUST_EFFECTS
 
 _REFIT = SHIPPED["videoray_refit"]
-
-
-@pytest.fixture(scope="module")
-def refit() -> Mapping[str, bytes]:
-    """The files of an identified vehicle in the folder of FMI-LS-REF."""
-    return reference_results(load_vehicle(_REFIT))
 
 
 # ---- The files and their roles ---------------------------------------------------------------------------------------
@@ -97,7 +85,6 @@ thrust_12_v.csv: model text/csv Measured thrust, curve main
 thrust_16_v.csv: model text/csv Measured thrust, curve main
 thrust_16_v.csv: model text/csv Measured thrust, curve bow
 videoray_refit.toml: model application/toml The vehicle file
-covariance.csv: result text/csv Standard errors and covariance of the identified coefficients
 """
 
 
@@ -106,40 +93,3 @@ def test_each_file_has_its_role_and_its_description() -> None:
     found = [one for path in vehicles for one in origin(load_vehicle(path))[1]]
     told = [f"{one.source.rpartition('/')[2]}: {one.role} {one.type} {one.description}" for one in found]
     assert told == ROLES.strip().splitlines()
-
-
-def test_the_covariance_is_that_of_the_vehicle_file(refit: Mapping[str, bytes]) -> None:
-    estimates = tomlkit.parse(_REFIT.read_text(encoding="utf-8"))["estimates"]
-    rows = {row["name"]: row for row in csv.DictReader(io.StringIO(refit[f"{FOLDER}/covariance.csv"].decode()))}
-    assert rows.keys() == estimates.keys()
-    for name, row in rows.items():
-        for other in rows:
-            pair = estimates[name].get("correlation", {}), estimates[other].get("correlation", {})
-            r = 1.0 if name == other else pair[0].get(other, pair[1].get(name, 0.0))
-            expected = r * estimates[name]["error"] * estimates[other]["error"]
-            assert float(row[other]) == pytest.approx(expected, rel=1e-5, abs=1e-300)
-    assert (rows["a_d_r"]["unit"], rows["a_d_r"]["value"]) == ("N.m.s2/rad2", "0.0985115")
-
-
-def test_the_parameter_sets_are_the_most_probable_ones_at_the_end_of_an_interval(refit: Mapping[str, bytes]) -> None:
-    """By the conditional mean of a normal distribution; β has the logarithmic one."""
-    vehicle = load_vehicle(_REFIT)
-    rows = [*csv.DictReader(io.StringIO(refit[f"{FOLDER}/covariance.csv"].decode()))]
-    names = [row["name"] for row in rows]
-    mean = np.array([float(row["value"]) for row in rows])
-    C = np.array([[float(row[name]) for name in names] for row in rows])
-    experiments = etree.fromstring(refit[f"{FOLDER}/uncertainty.exp"])
-    assert len(experiments) == 2 * len(names)
-    for experiment in experiments:
-        name, _, end = experiment.get("name").rpartition("_")
-        k, sign = names.index(name), {"low": -1.0, "high": 1.0}[end]
-        shift = C[:, k] / C[k, k] * sign * 1.959964 * np.sqrt(C[k, k])
-        factor = np.array([n.startswith("beta_") for n in names])
-        expected = np.where(factor, mean * np.exp(shift / mean), mean + shift)
-        bounds = [(vehicle.layout.coefficients[n].minimum, vehicle.layout.coefficients[n].maximum) for n in names]
-        expected = np.clip(expected, *np.array(bounds).T)
-        parameters = etree.fromstring(refit[f"{FOLDER}/{experiment.find('Parameters').get('source')}"])
-        values = {x.get("name"): float(x[0].get("value")) for x in parameters.iter("{*}Parameter")}
-        for n, other in enumerate(names):
-            assert values.get(other, mean[n]) == pytest.approx(expected[n], rel=1e-4, abs=1e-4 * np.sqrt(C[n, n]))
-        vehicle.with_(**values)  # raises an exception about what is not possible
