@@ -15,7 +15,6 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike, is_extrapolated
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5, 1.0, -1.0)
@@ -36,8 +35,6 @@ _GRID = np.linspace(0.0, 1.0, 101)
 _DIFFERENT = np.array([0.15, 0.3, 0.3])
 """Two vehicles differ along an axis if ln of a V_ss, a time or a stopping distance does by more: the half-widths up to
 which these are *good*."""
-_DRAWS = 256
-"""The number of vehicles that are drawn from the estimates of a vehicle file."""
 
 
 def tested_commands(objective: Objective, z: Array) -> dict[Axis, Tested]:
@@ -208,26 +205,6 @@ def commands_that_push(push: Callable[[float], float], tested: Tested) -> Tested
         for sign, end in zip((-1.0, 1.0), tested, strict=True)
     )
     return astern, ahead
-
-
-def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
-    """Return the answers of a vehicle file, without those that are not finite.
-
-    The intervals contain 95 % of the vehicles that its estimates allow; a file without estimates has none, so that they
-    have no width.
-    """
-    from scipy.stats.qmc import Sobol  # imported here because it is slow
-
-    known = vehicle.uncertainty
-    drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
-    drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
-    rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
-    responses = _responses_of(rovs, QUADRATIC_DRAG, axis, COMMANDS).reshape(len(COMMANDS), 3, -1)
-    values = responses[..., 0]
-    low, high = values, values
-    if known.names:
-        low, high = np.quantile(responses[..., 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=-1)
-    return _finite(axis, COMMANDS, values, low, high)
 
 
 def _finite(axis: Axis, commands: Sequence[float], values: Array, low: Array, high: Array) -> tuple[Answer, ...]:

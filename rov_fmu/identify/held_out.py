@@ -117,27 +117,13 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
 # ---- Predictions -----------------------------------------------------------------------------------------------------
 
 
-def predictions(
-    objective: Objective, best: Minimum, out: Sequence[HeldOut], against: Vehicle | None = None
-) -> Iterator[Prediction]:
-    """Yield the prediction of each quantity that is held out, and that by a vehicle to compare with.
-
-    That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
-    """
-    other = _other(objective.table, against)
+def predictions(objective: Objective, best: Minimum, out: Sequence[HeldOut]) -> Iterator[Prediction]:
+    """Yield the prediction of each quantity that is held out."""
     for held in out:
         covariance = held.fit.covariance
         if held.log not in held.part.logs:
             covariance = _of_unseen(objective, best, covariance, held.log)
-        yield from _predicted(objective, held, cautious(objective, held.fit.z), covariance, other)
-
-
-def _other(table: Table, against: Vehicle | None) -> Table | None:
-    """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
-    if not against or against.layout.gains != table.layout.gains:
-        return None
-    is_whole = len(against.with_(table.layout).coefficients) == len(against.coefficients)
-    return table.of_vehicle(against) if is_whole else None
+        yield from _predicted(objective, held, cautious(objective, held.fit.z), covariance)
 
 
 def _of_unseen(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
@@ -166,14 +152,10 @@ def cautious(objective: Objective, z: Array) -> Array:
     return np.maximum(z, [log(size) if size else -inf for size in sizes])
 
 
-def _predicted(
-    objective: Objective, out: HeldOut, z: Array, covariance: Array, other: Table | None
-) -> Iterator[Prediction]:
+def _predicted(objective: Objective, out: HeldOut, z: Array, covariance: Array) -> Iterator[Prediction]:
     """Yield the predictions of what is held out: over its whole length, and over a shorter time.
 
-    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows. The
-    vehicle to compare with has the usual noise. That of a fit is too small for it: the filter would explain its errors
-    by a thrust that fades to 0.
+    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows.
     """
     sampled, record = objective.logs[out.log], objective.records[out.log]
     inside = np.zeros(len(record.time), bool)
@@ -182,8 +164,6 @@ def _predicted(
     for span in (inf, sampled.horizon):
         try:
             off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
-            usual = np.where(objective.table.each("of_motion"), z, objective.mean)
-            compared = objective.run(usual, out.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
         later = inside & record.after(begin)
@@ -211,7 +191,6 @@ def _predicted(
                 error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 loss=cost(off, deviation**2) / len(off),
-                compared=measured - compared.innovations[at] if compared else None,
             )
 
 

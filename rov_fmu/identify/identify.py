@@ -43,7 +43,7 @@ from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 
 __all__ = ["identify", "load_tests"]
 
@@ -62,8 +62,6 @@ def identify(tests: Tests, on_progress: Progress = silent, on_answer: OnAnswer |
 
 
 def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -> Identification:
-    path = tests.description.tables.against
-    against = load_vehicle(path) if path else None
     on_progress("reading the logs", 0.0)
     known, logs, rows = begin(tests)
     if not (known.fitted or known.curves):
@@ -83,7 +81,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     show(0)
     predicted = []
     out = [] if fit.has_ended else held_out(fit.objective, fit.best)  # nobody should use what it predicts
-    for prediction in predictions(fit.objective, fit.best, out, against):
+    for prediction in predictions(fit.objective, fit.best, out):
         predicted.append(prediction)
         show(len(predicted))
     runs = followed(fit.objective, fit.best.z)
@@ -99,7 +97,6 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     found = Identification(
         folder=tests.folder,
         vehicle=with_own_inputs(vehicle, tests),
-        against=against,
         axes=(),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in fit.known.curves},
         forces=tuple(p for p in points if p.quantity == "force"),
@@ -150,7 +147,7 @@ def _axis(
     mixed = dict.fromkeys(file for file, count in driving if count > 1)
     slow = [*largest(d for d in found.disturbances if d.concerns(axis) and d.file in files)]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
-    against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
+    push = assess.push_of_thrusters(vehicle, found.vehicle, axis)
     least = assess.ROCKING if may_rock(tests.folder, axis) else 0.0
     answers: tuple[Answer, ...] = ()
     tested_own = assess.commands_that_push(push, tested) if push else tested
@@ -170,7 +167,6 @@ def _axis(
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
         points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
-        compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio,
         soon=fit.structure[axis].soon,
         disturbances=slow,

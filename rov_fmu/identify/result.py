@@ -11,7 +11,7 @@ from typing import Literal
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.kinds import KINDS, SENSOR_SCALE, SLOW, Process
 from rov_fmu.io.messages import listed
-from rov_fmu.tank.arrays import Array, rms
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.quality import rate
@@ -179,13 +179,6 @@ class Prediction:
     """The share of the samples inside the 95 % band."""
     loss: float
     """The mean of ln S + rho(e² / S), as in J, with the error e and the square S of the deviation."""
-    compared: Array | None = None
-    """The same prediction by the vehicle to compare with; None if it lacks the axis or has other thrusters."""
-
-    @property
-    def compared_error(self) -> float | None:
-        """The RMS error of the vehicle to compare with."""
-        return None if self.compared is None else rms(self.measured - self.compared)
 
     @property
     def ahead(self) -> str:
@@ -512,8 +505,6 @@ class AxisResult:
     predictions: tuple[Prediction, ...] = ()
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[MeasuredPoint, ...] = ()
-    compared: tuple[Answer, ...] = ()
-    """The answers of the vehicle to compare with."""
     structure: float = 0.0
     """The error R of the fit to all data over 10 s, relative to what noise explains (`search.structure`)."""
     soon: float = 0.0
@@ -572,8 +563,6 @@ class Identification:
     folder: Folder
     """The tests, with rov.toml."""
     vehicle: Vehicle
-    against: Vehicle | None
-    """The vehicle to compare with."""
     axes: tuple[AxisResult, ...]
     curves: Mapping[str, tuple[IdentifiedCoefficient, ...]]
     """The coefficients of each thrust curve."""

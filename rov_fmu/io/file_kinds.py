@@ -43,7 +43,7 @@ _BY_SUFFIX = {
 _BY_KEY = {
     **dict.fromkeys(("component", "connect"), SYSTEM_PLAN),
     **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),
-    **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
+    **dict.fromkeys(("known", "windows", "base"), TESTS_FILE),
     **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
 }
 """Keys at the top of a TOML file, each with the only or the most likely kind of file that has it."""

@@ -12,7 +12,6 @@ from rov_fmu.identify import findings
 from rov_fmu.identify.result import (
     AxisResult,
     Identification,
-    MeasuredPoint,
     Prediction,
     half_width,
     is_known,
@@ -26,7 +25,6 @@ from rov_fmu.report.plots.svg import KNOTS, NARROW, in_both_widths, inline_svg, 
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.steady import speed_table
-from rov_fmu.vehicle.vehicle import Vehicle
 
 _SIZE = NARROW, 2.7
 """The size of a plot, inches."""
@@ -66,8 +64,6 @@ def report_page(results: Identification, on_progress: Progress = silent) -> str:
         speeds=[*speed_table(results.vehicle)],
         layout=results.vehicle.layout,
         KNOTS=KNOTS,
-        by=_by,
-        by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=relative_error,
         with_stop=with_stop,
         is_known=lambda estimate: is_known(half_width(estimate)),
@@ -101,13 +97,3 @@ def _picture(results: Identification, shown: Sequence[Prediction], plot: Callabl
     log = next((log for log in results.folder.logs if log.file == shown[0].file), None)
     height = height_of(log, shown, measured=False)
     return in_both_widths(partial(plot, predictions=shown, log=log, measured=False), height)
-
-
-def _by(p: MeasuredPoint, other: Vehicle) -> float | None:
-    """Return the value of a point by another vehicle; None if it lacks the curve or the axis."""
-    layout = other.layout
-    if p.quantity == "force":
-        curve = layout.curves_by_name.get(p.subject)
-        return other.curve_force(curve, p.command) if curve else None
-    form = layout.by_name.get(p.subject)
-    return other.response(form.axis, p.command)[p.quantity == "Tau"] if form else None

@@ -102,6 +102,12 @@ def _find_vehicle(name: object, info: ValidationInfo) -> Path:
 
 _VehicleFile = Annotated[Path, BeforeValidator(_find_vehicle)]
 
+UNUSED = {
+    "against": "a report compares with no other vehicle. `rov-fmu fly --against` does",
+    "limits": "the next test keeps to no limits",
+}
+"""The keys of earlier versions, which may still be there, and why nothing reads them."""
+
 
 def _check_curve_names(value: object) -> object:
     if value is not True and not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
@@ -188,15 +194,13 @@ class RovTables(Tables):
     curves: dict[Symbol, CurveToFit] = Field(default={}, max_length=MOST_OF_A_KIND)
     base: _VehicleFile | None = None
     """The vehicle file to begin from."""
-    against: _VehicleFile | None = None
-    """The vehicle file to compare with."""
     vehicle: Head | None = None
     known: dict[str, Quantity] = Field(default={})
     windows: dict[str, _Window] = Field(default={})
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
+    against: Any = None
     limits: Any = None
-    """What next tests had to keep to. Files that have it are read, and nothing uses it."""
     fit: Requests = Requests()
     priors: dict[str, _Deviation] = Field(default={})
     """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""

@@ -34,6 +34,7 @@ from rov_fmu.tank.columns import COMMAND, TABLES, TIME, ColumnNames, columns_of,
 from rov_fmu.tank.description import (
     NO_ROV_FILE,
     ROV_FILE,
+    UNUSED,
     Dive,
     Draft,
     Requests,
@@ -332,10 +333,11 @@ def read_folder(
     paths = [path for path in listing.tests if path.name not in parts]
     if not paths and not dives:
         raise VehicleFileError(*mistakes, *listing.no_tests())
-    vehicles = filter(None, (tables.against, tables.base))
-    check_inputs([*own, *paths, *(folder / part for part in parts), *vehicles])
+    check_inputs([*own, *paths, *(folder / part for part in parts), *([tables.base] if tables.base else [])])
     found.read_all(paths)
     found.findings += listing.findings
+    unused = [key for key in UNUSED if getattr(tables, key) is not None]
+    found.findings += [about(f"{key} in {ROV_FILE}", "other files", reason=UNUSED[key]) for key in unused]
     if found.mistakes:  # they may follow from files that are not read
         found.mistakes += listing.lines("unreadable file")
     if (description := rov_file.description) and not (mistakes or found.mistakes):

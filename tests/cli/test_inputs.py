@@ -32,7 +32,7 @@ READING: dict[str, tuple[str, str]] = {
     "the report": ("report.html", "build {f}/refit.toml"),
     "rov.toml": ("tests/rov.toml", "identify {f}/tests"),
     "a tank test": ("tests/steady_surge.csv", "identify {f}/tests"),
-    "the vehicle to compare with": ("tests/beside.toml", "identify {f}/tests"),
+    "the base": ("tests/beside.toml", "identify {f}/tests"),
     "the plan": ("plan.toml", "study {f}/plan.toml -o {f}/results"),
     "the FMU of a plan": ("rov.fmu", "study {f}/of_fmu.toml -o {f}/results"),
     "the commands": ("commands.csv", "simulate {f}/videoray.toml --input {f}/commands.csv"),
@@ -69,7 +69,7 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     reported = refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"')
     (folder / "refit.toml").write_text(reported, encoding="utf-8")
     rov = (folder / "tests" / "rov.toml").read_text(encoding="utf-8")
-    beside = rov.replace('against = "videoray"', 'against = "beside.toml"')
+    beside = rov.replace("\n[vehicle]", '\nbase = "beside.toml"\n[vehicle]')
     assert beside != rov
     (folder / "tests" / "rov.toml").write_text(beside, encoding="utf-8")
     (tmp_path / "here").mkdir()

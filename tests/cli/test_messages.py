@@ -163,9 +163,9 @@ KEYS: dict[str, tuple[str, str, str, str]] = {
     "a_tt": (BUILD, "a_t = ", "a_tt = ", "curves.rear.a_tt: there is no such key; did you mean a_t?"),
     "a vehicle in capital letters": (
         IDENTIFY,
-        'against = "videoray"',
-        'against = "VideoRay"',
-        "against = 'VideoRay': must be a vehicle file in this ",
+        "[vehicle]",
+        'base = "VideoRay"\n[vehicle]',
+        "base = 'VideoRay': must be a vehicle file in this ",
     ),
     "a key of rov.toml": (
         IDENTIFY,

@@ -35,7 +35,7 @@ from tests.bridges.test_sdf import IN_GAZEBO, LOADED, with_cross
 from tests.commands import without_progress
 from tests.frozen.comparison import differences
 from tests.report.pages import check_is_whole, lines_of
-from tests.report.results import bare, compared_with, doubtful, example
+from tests.report.results import bare, doubtful, example
 from tests.vehicles import (
     EVERYTHING,
     HEAVY,
@@ -219,7 +219,6 @@ RESULTS: dict[str, Callable[[], str]] = {
     "report.txt": partial(_report, example),
     "report_of_little.txt": partial(_report, bare),
     "report_of_doubts.txt": partial(_report, doubtful),
-    "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
     **{f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}") for path in LOGS.iterdir()},
     "inspection_page.txt": partial(_in_copy, LOGS / "dives", "inspect {f} --report {f}.html"),
     **{

@@ -26,13 +26,13 @@ Identified = Callable[[str, Callable[[Path], Tests]], Identification]
 
 @pytest.fixture(scope="session")
 def identified(made_once: Made) -> Identified:
-    """Return what is identified from tests, without what rov.toml says and the vehicle to compare with."""
+    """Return what is identified from tests, without what rov.toml says."""
 
     def found(name: str, write: Callable[[Path], Tests]) -> Identification:
         def fill(folder: Path) -> None:
             result = identify(write(folder / "tests"))
             bare = replace(result.folder, rov_file=NO_ROV_FILE)
-            kept = replace(result, folder=bare, vehicle=replace(result.vehicle), against=None)
+            kept = replace(result, folder=bare, vehicle=replace(result.vehicle))
             (folder / "result").write_bytes(pickle.dumps(kept))
 
         result = pickle.loads((made_once(name, fill) / "result").read_bytes())

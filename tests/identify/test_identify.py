@@ -372,7 +372,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
     spread([key for key in PRIORS if not key.endswith("noise")], (), ["thrust_shape", "voltage"]),
 )
 def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
-    rov = f'base = "videoray"\nagainst = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
+    rov = f'base = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
     folder = with_logs(tmp_path, HEAVE, 1, rov, {})
     (path,) = folder.glob("log_*.csv")
     add_voltage(path)
@@ -380,10 +380,6 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
     assert all(np.isfinite(value) for value in found.vehicle.coefficients.values())
     assert all(np.isfinite(effect.evidence) for effect in found.effects)
     assert key.replace("_", " ") not in {effect.kind for effect in found.effects}
-    (heave,) = found.axes
-    assert all(p.compared_error and p.compared_error < 0.7 for p in heave.predictions)
-    for answer in heave.compared:
-        assert (answer.steady[0], answer.rise[0]) == pytest.approx(VIDEORAY.response(HEAVE, answer.command))
     if key == "voltage":
         assert found.vehicle["n_V_top"] == USUAL_EXPONENT
         assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"

@@ -329,7 +329,7 @@ def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path:
     assert [line.removeprefix("  ") for line in lines[: len(text.splitlines())]] == text.splitlines()
     document = parsed(text)
     assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("A ROV (2)", "a_rov_2")
-    assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
+    assert document["base"] == "bluerov2"
     assert "dives" not in document, "its log is one file"
     capsys.readouterr()
     assert main(["inspect", str(folder), "--draft"]) == 0
@@ -339,7 +339,7 @@ def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path:
 
 
 INCOMPLETE: dict[str, tuple[str, set[str]]] = {
-    "": (" ", {"base", "against", "vehicle", "known", "columns"}),
+    "": (" ", {"base", "vehicle", "known", "columns"}),
     "a base": ('base = "bluerov2"  # mine\n', {"vehicle", "columns"}),
     "a column": ('[columns]\n"Sonde" = "depth [ft]"  # my unit\n', {"base", "vehicle"}),
     "thrusters": (VECTORED, {"columns"}),

@@ -45,7 +45,7 @@ def _vehicle(folder: Path, old: str, new: str) -> list[str]:
 def _tests(folder: Path, new: str) -> list[str]:
     shutil.copytree(TESTS, folder, dirs_exist_ok=True)
     path = folder / "rov.toml"
-    path.write_text(path.read_text(encoding="utf-8").replace('against = "videoray"', new, 1), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("[vehicle]", f"{new}\n[vehicle]", 1), encoding="utf-8")
     return ["identify", str(folder), "-o", str(folder / "out.toml")]
 
 
@@ -55,7 +55,6 @@ KEYS: dict[str, Callable[[Path, str], list[str]]] = {
     "provenance.report": lambda f, n: _vehicle(f, "\n[provenance]", f'\n[provenance]\nreport = "{n}"'),
     "vehicle.data": lambda f, n: _vehicle(f, "\n[validity]", f'data = "{n}"\n[validity]'),
     "vehicle.pictures": lambda f, n: _vehicle(f, "\n[validity]", f'pictures = "{n}"\n[validity]'),
-    "against": lambda f, n: _tests(f, f'against = "{n}"'),
     "base": lambda f, n: _tests(f, f'base = "{n}"'),
 }
 

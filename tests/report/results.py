@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
@@ -37,7 +36,7 @@ from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import with_intervals
 
 FILES = ("log_1.csv", "log_2.csv")
@@ -157,7 +156,6 @@ def without_findings() -> Identification:
     return Identification(
         folder=Folder(Path("pond"), NO_ROV_FILE, logs=[*map(log, FILES)], inputs=inputs, findings=findings, rows=rows),
         vehicle=vehicle,
-        against=None,
         axes=axes,
         curves={
             "top": (IdentifiedCoefficient("b_t_top", 10.0, (9.0, 11.0), "N", "11 within 10 %, from the forces", 0.9),)
@@ -211,16 +209,3 @@ def doubtful() -> Identification:
     curves = {"top": (IdentifiedCoefficient("a_t_top", 6.0, (5.0, 7.0), "N", "6.0 ± 1.0 N", 0.5),)}
     slips = (Slip(FILES[1], "depth", "is it in cm", 20.0),)
     return told(replace(driven_by(["l", "t"]), slips=slips, forces=(), curves=curves))
-
-
-def compared_with(other: Vehicle) -> Identification:
-    """Return the example beside another vehicle, whose predictions are half a unit off."""
-    axes = tuple(
-        replace(
-            result,
-            predictions=tuple(replace(p, compared=p.predicted + 0.5) for p in result.predictions),
-            compared=answers_of_file(other, result.axis),
-        )
-        for result in example().axes
-    )
-    return replace(example(), against=other, axes=axes)

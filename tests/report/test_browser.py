@@ -11,13 +11,11 @@ import pytest
 from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.report import report_page
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
 from tests.report.conftest import Visit
 from tests.report.fly.boxes import SCREENS, problems
 from tests.report.pages import check_fits_and_is_accessible
-from tests.report.results import compared_with, example
+from tests.report.results import example
 from tests.tank.readers.motion import DIVE
 from tests.tank.readers.writers import LOGS
 
@@ -32,14 +30,6 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report of an identification."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(report_page(example()), encoding="utf-8")
-    return path
-
-
-@pytest.fixture(scope="module")
-def comparison(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of an identification beside another vehicle, with the most words in each cell."""
-    path = tmp_path_factory.mktemp("comparison") / "report.html"
-    path.write_text(report_page(compared_with(load_vehicle(VIDEORAY))), encoding="utf-8")
     return path
 
 
@@ -59,7 +49,7 @@ def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("width", "scheme"), SCREENS)
-@pytest.mark.parametrize("name", ["documentation", "report", "comparison", "inspection"])
+@pytest.mark.parametrize("name", ["documentation", "report", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
 ) -> None:

@@ -14,7 +14,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.tank.description import ROV_FILE
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle, without_surface
 from tests.commands import TESTS
@@ -232,3 +232,19 @@ def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
     assert given.description.tables.vehicle
     assert given.description.tables.vehicle.name == "Our BlueROV2"
     assert given.layout == without_surface(load_vehicle(SHIPPED["bluerov2"])).layout
+
+
+# ---- Keys of earlier versions ----------------------------------------------------------------------------------------
+
+
+def test_keys_of_earlier_versions_are_read_and_one_line_says_that_nothing_uses_them(tmp_path: Path) -> None:
+    rov, tables = f'base = "videoray"\n{HEAD}', {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
+    plain, old = (
+        load_tests(folder_of(tmp_path / name, text, tables)).folder.findings
+        for name, text in (("plain", rov), ("old", f'against = "gone.toml"\n{rov}[limits]\ndepth = 3.0\n'))
+    )
+    assert sentences(old) == (
+        "against in rov.toml: not read, because a report compares with no other vehicle. `rov-fmu fly --against` does",
+        "limits in rov.toml: not read, because the next test keeps to no limits",
+        *sentences(plain),
+    )

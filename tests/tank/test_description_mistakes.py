@@ -53,7 +53,6 @@ span = {}
 LOGGED = {"a": ",voltage [V]", "b": ",salinity"}
 ROWS = "".join(f"{n},{0.1 * n % 1:.1f},{n},{n}\n" for n in range(30))
 WRONG: list[tuple[str, Mapping[str, str], str]] = [
-    (f'against = "videoray2"\n{BLUEROV2}', HEAVE_ALONE, "/rov.toml: against = 'videoray2': must be a vehicle file"),
     (
         f'base = "bluerov3"\n{HEAD}',
         HEAVE_ALONE,

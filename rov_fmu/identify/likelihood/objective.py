@@ -262,12 +262,9 @@ class Objective:
 
     # ---- One log ----
 
-    def run(self, z: Array, number: int, *, table: Table | None = None, **how: object) -> FilterRun:
-        """Run the filter through a log, if given with the coefficients of another table.
-
-        The other options are those of `Filter.run`. Raises DivergedError.
-        """
-        parameters = (table or self.table).of_log(z, self.logs[number])
+    def run(self, z: Array, number: int, **how: object) -> FilterRun:
+        """Run the filter through a log, with the options of `Filter.run`. Raises DivergedError."""
+        parameters = self.table.of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
 
     def reached(self, z: Array, number: int) -> dict[Axis, tuple[float, float]]:

@@ -89,7 +89,7 @@ def _draw_channel(ax: Axes, channel: Channel, since: float) -> None:
 
 def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: bool) -> None:
     """Draw what was measured of an unseen log and what was predicted, with the 95 % band."""
-    names = ("measured", "predicted, with 95 % band", "compared") if is_named else (None,) * 3
+    names = ("measured", "predicted, with 95 % band") if is_named else (None, None)
     factor, unit = in_degrees(shown.unit)
     some = slice(None, None, max(1, len(shown.time) // MOST_SAMPLES))
     time, half = shown.time[some] - since, factor * NORMAL * shown.deviation[some]
@@ -97,12 +97,10 @@ def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: boo
     fill_band(ax, time, predicted - half, predicted + half)
     ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label=names[0])
     ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label=names[1])
-    if shown.compared is not None:
-        ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label=names[2])
     ax.margins(x=0.0, y=0.12)
     name_axes(ax, f"{shown.quantity}{shown.ahead}", unit)
 
 
-def fill_band(ax: Axes, x: Array, low: Array, high: Array, color: str = "blue") -> None:
+def fill_band(ax: Axes, x: Array, low: Array, high: Array) -> None:
     """Draw a band between two lines."""
-    ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.25, linewidth=0.0)
+    ax.fill_between(x, low, high, color=LIGHT["blue"], alpha=0.25, linewidth=0.0)

@@ -23,7 +23,7 @@ from rov_fmu.vehicle.description import why_no_identifier
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-_HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "known", "against")
+_HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "known")
 """The tables and keys of a draft that describe the vehicle. A rov.toml that has a vehicle needs none of them."""
 
 

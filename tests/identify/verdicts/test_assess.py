@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify.assess import answers, answers_of_file, differs
+from rov_fmu.identify.assess import answers, differs
 from rov_fmu.identify.assess import tested_commands as of_tests
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
@@ -18,8 +18,6 @@ from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.result import Tested
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import REFIT
 from tests.folders import HEAD, MASS, TURNS, folder_of, responses
 from tests.identify.conftest import FORCES
 from tests.vehicles import VIDEORAY, extended
@@ -50,22 +48,6 @@ def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_te
     for at, own in ((half, 0.0), (full, beyond)):
         for (value, (_, high)), by_drag in zip((at.steady, at.rise, at.stop), (0.03, 0.03, 0.06), strict=True):
             assert np.log(high / value) == pytest.approx(max(own, by_drag)), "it may have rocked unseen"
-    assert answers_of_file(losing, SURGE)[2].stop[0] == pytest.approx(half.stop[0])
-
-
-def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
-    """A file without estimates has no intervals: both ends are the value."""
-    rov = load_vehicle(REFIT)
-    names, rows = rov.uncertainty.names, np.random.default_rng(0).random((1000, len(rov.uncertainty.names)))
-    drawn = [rov.with_(**dict(zip(names, row, strict=True))) for row in rov.uncertainty.drawn(rows).tolist()]
-    for answer, exact in zip(answers_of_file(rov, HEAVE), answers_of_file(VIDEORAY, HEAVE), strict=True):
-        numbers = np.array([k.response(HEAVE, answer.command) for k in drawn])
-        for (value, interval), some, own in zip(
-            (answer.steady, answer.rise), numbers.T, rov.response(HEAVE, answer.command), strict=True
-        ):
-            assert value == pytest.approx(own)
-            assert interval == pytest.approx(np.quantile(some, (0.025, 0.975)), abs=0.3 * np.std(some))
-        assert exact.steady == (exact.steady[0], (exact.steady[0], exact.steady[0]))
 
 
 def test_a_command_is_tested_by_the_motion_along_its_axis_that_it_holds(fit: Fit) -> None:
