@@ -59,16 +59,12 @@ DOCUMENTED = ConfigDict(use_attribute_docstrings=True)
 """The `model_config` of a class that adds keys with docstrings to a base made by `table_model`."""
 
 
-def table_model(
-    name: str, base: type[Strict], fields: Mapping[str, Any], words: str | None = None, needed: Sequence[str] = ()
-) -> Any:
-    """Return a table whose fields are computed. Its JSON schema says that the needed ones must be there.
+def table_model(name: str, base: type[Strict], fields: Mapping[str, Any], words: str | None = None) -> Any:
+    """Return a table whose fields are computed.
 
     They have no docstrings in any source file, and pydantic would take long to search for them.
     """
-    settings: dict[str, Any] = {"use_attribute_docstrings": False}
-    if needed:
-        settings["json_schema_extra"] = lambda schema: schema.update(required=[*needed, *schema.get("required", ())])
+    settings = {"use_attribute_docstrings": False}
     return create_model(name, __base__=base, __doc__=words, __cls_kwargs__=settings, **fields)
 
 

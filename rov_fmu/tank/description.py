@@ -41,6 +41,7 @@ from rov_fmu.io.toml_file import (
     problem_lines,
     read_toml,
     rule,
+    table_model,
 )
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
@@ -49,8 +50,8 @@ from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.full_thrust import CurveToFit
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
+from rov_fmu.vehicle.schema import AXIS_TABLES, NOT_GIVEN, Arm, Axes, Tables, read_tables, to_fit
 from rov_fmu.vehicle.schema import MOST as MOST_OF_A_KIND
-from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -188,10 +189,16 @@ def _check_axes(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
+_ArmToFit = to_fit(Arm)
+_AxesToFit = table_model("Axes", Axes, {name: (to_fit(table) | None, None) for name, table in AXIS_TABLES.items()})
+
+
 class RovTables(Tables):
     """The tables of rov.toml that could be read."""
 
+    arm: _ArmToFit | None = None  # type: ignore[valid-type]
     curves: dict[Symbol, CurveToFit] = Field(default={}, max_length=MOST_OF_A_KIND)
+    axes: _AxesToFit | None = None  # type: ignore[valid-type]
     base: _VehicleFile | None = None
     """The vehicle file to begin from."""
     vehicle: Head | None = None
@@ -222,6 +229,12 @@ class RovTables(Tables):
         """True where the commands of the logs are a wrench: the file says so, or has [body] and no thrusters."""
         has_thrusters = self.base or self.arm or self.thruster or self.curves or self.inputs or self.fin
         return bool(self.logs.wrench or (self.body and not has_thrusters))
+
+
+class _WholeTables(RovTables):
+    """The tables of a rov.toml without a mistake."""
+
+    vehicle: Head
 
 
 # ---- The description -------------------------------------------------------------------------------------------------
@@ -326,7 +339,7 @@ def read_rov_file(path: Path, base: Path | None = None, draft: Draft | None = No
     data = parse_toml(path, draft.text.encode(), VehicleFileError) if draft else read_toml(path, VehicleFileError)
     context = {"folder": path.parent}
     data |= {"base": base} if base else {}
-    file, problems, lost = read_tables(data, RovTables, context, ("vehicle",), ("fin",))
+    file, problems, lost = read_tables(data, RovTables, _WholeTables, context)
     vehicle, base_mistakes = None, list[str]()
     try:
         vehicle = load_vehicle(file.base) if file.base else None

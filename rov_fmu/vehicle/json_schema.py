@@ -4,12 +4,12 @@ import json
 from typing import Any
 
 from rov_fmu.io.toml_file import Strict
-from rov_fmu.vehicle.schema import File
+from rov_fmu.vehicle.schema import WholeFile
 
 _NULL = {"type": "null"}
 
 
-def json_schema(of: type[Strict] = File) -> dict[str, Any]:
+def json_schema(of: type[Strict] = WholeFile) -> dict[str, Any]:
     """Return the schema of a TOML file."""
     schema: dict[str, Any] = _simplified(of.model_json_schema())
     return schema

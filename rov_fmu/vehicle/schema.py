@@ -4,7 +4,7 @@
 """
 
 import os
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property, reduce
 from itertools import pairwise
@@ -83,17 +83,25 @@ def _coefficients(
     needed: bool = True,
     base: type[Strict] = Strict,
 ) -> Any:
-    """Return a table with a key for each coefficient, of which any may be missing.
+    """Return a table with a key for each coefficient.
 
-    Editors are told which a vehicle file must have, unless it depends on other tables which are `needed`. `negative`
-    says, by the key, what to give instead of a negative value.
+    Any may be missing if it depends on other tables which are `needed`. `negative` says, by the key, what to give
+    instead of a negative value.
     """
     fields: dict[str, Any] = {}
     for key, declaration in declarations.items():
         one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
-        fields[key] = (one | None, Field(None, description=declaration.description))
-    told = [key for key, declaration in declarations.items() if needed and declaration.needed]
-    return table_model(f"_{name}", base, fields, words, told)
+        is_required = needed and declaration.needed
+        kind, default = (one, ...) if is_required else (one | None, None)
+        fields[key] = (kind, Field(default, description=declaration.description))
+    return table_model(f"_{name}", base, fields, words)
+
+
+def to_fit(table: type[Strict]) -> Any:
+    """Return a table of which any key may be missing, because tests tell it."""
+    fields = table.model_fields.items()
+    open_ = {key: (one.annotation | None, None) for key, one in fields if one.is_required()}  # type: ignore[operator]
+    return table_model(table.__name__, table, open_, table.__doc__)
 
 
 def given_quantities(table: Strict, declarations: Mapping[str, Declaration]) -> dict[str, Quantity]:
@@ -245,7 +253,7 @@ class CurveTable(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[
 
 
 _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
-_tables = {
+AXIS_TABLES = {
     axis.name: _coefficients(
         axis.name.capitalize(),
         declarations_of(axis),
@@ -254,7 +262,7 @@ _tables = {
     )
     for axis in AXES.values()
 }
-_axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.items()}
+_axes: dict[str, Any] = {name: (table | None, None) for name, table in AXIS_TABLES.items()}
 
 
 class Axes(table_model("_Axes", Strict, _axes)):  # type: ignore[misc]
@@ -531,29 +539,19 @@ class _Head(Strict):
     """The first keys and tables of a vehicle file."""
 
     format: Literal[2] | None = None
-    """The version of this file format."""
     vehicle: FileHead | None = None
     validity: Validity | None = None
 
 
-NEEDED = ("format", "vehicle", "validity", "body", "axes")
-"""The keys and tables that a vehicle file must have."""
-DRIVING = ("curves", "thruster")
-"""The tables that it must also have, unless nothing in it is of thrusters, so that loads from outside drive it."""
-
-
-def _needed_in_file(schema: dict[str, Any]) -> None:
-    """Tell editors what a vehicle file must have."""
-    schema["required"] = [*NEEDED]
+def _needed_by_thrusters(schema: dict[str, Any]) -> None:
+    """Tell editors what the file of a vehicle with thrusters must have."""
     schema["dependentRequired"] = {"curves": ["thruster"], "thruster": ["curves"]}
     schema["properties"]["curves"]["minProperties"] = 1
     schema["properties"]["thruster"]["minItems"] = 1
 
 
-class File(Tables, _Head, json_schema_extra=_needed_in_file):
-    """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
-
-    # Any table may be missing, so that others are read where one has a mistake. read_tables tells what lacks.
+class File(Tables, _Head):
+    """The tables of a vehicle file that could be read."""
 
     alternatives: dict[Annotated[str, NOT_BLANK], Alternative] = Field(default={})
     """Other published coefficients."""
@@ -562,24 +560,40 @@ class File(Tables, _Head, json_schema_extra=_needed_in_file):
     provenance: Provenance | None = None
 
 
+class WholeFile(File, json_schema_extra=_needed_by_thrusters):
+    """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
+
+    format: Literal[2]
+    """The version of this file format."""
+    vehicle: FileHead
+    validity: Validity
+    body: Body
+    axes: Axes
+
+
+class DrivenFile(WholeFile):
+    """The file of a vehicle that thrusters drive, and not only loads from outside."""
+
+    curves: dict[Symbol, CurveTable] = Field(min_length=1, max_length=MOST)
+    thruster: list[ThrusterTable] = Field(min_length=1, max_length=MOST)
+
+
+DRIVING = ("curves", "thruster", "arm", "fin", "inputs")
+"""A file that has one of these is that of a vehicle that thrusters drive."""
 _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
 """If an entry of one of these tables has a mistake, the other entries can still be checked."""
 _Model = TypeVar("_Model", bound=Tables)
 
 
 def read_tables(
-    data: Toml,
-    model: type[_Model],
-    context: Mapping[str, object],
-    needed: Iterable[str] = NEEDED,
-    complete: Container[str] = ("arm", "fin", "axes", "surface"),
+    data: Toml, model: type[_Model], whole: type[_Model], context: Mapping[str, object]
 ) -> tuple[_Model, list[ErrorDetails], set[str]]:
     """Return what could be read of a file, the problems with the rest, and the top-level tables with a problem.
 
-    `needed` are the tables that must be there, and `complete` those whose coefficients must be complete.
+    `whole` is the model of a file without a mistake, and in `model`, any table may be missing.
     """
-    file, problems = validate(data, model, **context)
-    problems = _in_order([*problems, *_missing_keys(data, needed, complete)], model)
+    file, problems = validate(data, whole, **context)
+    problems = _in_order(problems, model)
     wrong: dict[str, set[int | str | None]] = {}
     for place in (problem["loc"] for problem in problems):
         wrong.setdefault(str(place[0]), set()).add(place[1] if len(place) > 1 else None)
@@ -608,38 +622,3 @@ def _in_order(problems: Iterable[ErrorDetails], model: type[Strict]) -> list[Err
         return order.get(str(problem["loc"][0]), len(order)), problem["type"] == "extra_forbidden"
 
     return sorted(problems, key=place)
-
-
-def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -> Iterator[ErrorDetails]:
-    """Yield a problem, as pydantic reports it, for each key that is needed and missing."""
-    drives = DRIVING if needed is NEEDED and not data.keys().isdisjoint((*DRIVING, "arm", "fin", "inputs")) else ()
-    for name in (*needed, *drives):
-        if name not in data:
-            yield _missing(data, name)
-        elif data[name] in ({}, []) and name in DRIVING:
-            reason = "must have at least 1 item, not 0"
-            yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
-    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",)), (SURFACE, ("surface",))]
-    places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
-    places += [(AXIS, ("axes", name)) for name in AXES]
-    for declarations, place in places:
-        table = _table_at(data, place)
-        if place[0] in complete and isinstance(table, dict):
-            yield from (
-                _missing(table, *place, key) for key, kind in declarations.items() if kind.needed and key not in table
-            )
-
-
-def _table_at(data: Any, place: tuple[int | str, ...]) -> Any:
-    """Return what stands at a place in a file, or None if there is nothing."""
-    for step in place:
-        try:
-            data = data[step]
-        except (LookupError, TypeError):
-            return None
-    return data
-
-
-def _missing(table: Toml, *place: int | str) -> ErrorDetails:
-    """Return the problem that a key is missing in a table."""
-    return {"type": "missing", "loc": place, "msg": "Field required", "input": table}

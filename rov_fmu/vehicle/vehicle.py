@@ -29,7 +29,19 @@ from rov_fmu.vehicle.checks import check_parts, no_thrust
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance, StatedSpeed
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Basis, Estimated, File, read_tables
+from rov_fmu.vehicle.schema import (
+    DRIVING,
+    FORMAT,
+    NOT_GIVEN,
+    UNTUNED,
+    Alternative,
+    Basis,
+    DrivenFile,
+    Estimated,
+    File,
+    WholeFile,
+    read_tables,
+)
 
 if TYPE_CHECKING:
     from numpy import float64
@@ -514,7 +526,8 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
     if data["format"] != FORMAT:  # the rest of the file may have another meaning
         reason = f"must be {FORMAT}, the only version of the vehicle file"
         raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
-    file, problems, lost = read_tables(data, File, {"folder": path.parent, "coming": coming})
+    whole = WholeFile if data.keys().isdisjoint(DRIVING) else DrivenFile
+    file, problems, lost = read_tables(data, File, whole, {"folder": path.parent, "coming": coming})
     if mistakes := [*problem_lines(problems, data, File), *check_parts(file, lost, data)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, validity = file.vehicle, file.validity
