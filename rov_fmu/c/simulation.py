@@ -119,7 +119,7 @@ def simulate(
     record = list(vehicle.layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     lengths = np.diff(times)
-    tables, _alive = tables_of(vehicle, values, (vehicles, len(times)))
+    tables, arrays = tables_of(vehicle, values, (vehicles, len(times)))
     places = vehicle.layout.places
     recorded = np.array([places[name] for name in record], np.intc)
     result = np.empty((len(record), vehicles, len(times)))
@@ -128,7 +128,7 @@ def simulate(
     run.restype = ctypes.c_int if lanes else None
     pointers = [*map(pointer, (tables, times, lengths, recorded, result, failed))]
 
-    def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
+    def run_part(first: int, last: int, stop: ctypes.c_int, _alive: list[Array] = arrays) -> None:
         sizes = map(ctypes.c_ssize_t, (len(times), vehicles, first, last, len(record)))
         if run(*pointers, *sizes, ctypes.c_int(ended), ctypes.byref(stop), *([None] if lanes else [])) == 0:
             raise MemoryError
@@ -140,8 +140,8 @@ def simulate(
 
 
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return the address of an array, which must stay alive."""
-    return ctypes.c_void_p(array.ctypes.data)
+    """Return the address of an array, which stays alive as long as the address."""
+    return array.ctypes.data_as(ctypes.c_void_p)
 
 
 def reasons(layout: Layout, h: float) -> str:
@@ -161,6 +161,7 @@ def on_cores(
     """Call a function for parts of the vehicles, each from a first one to before a last one, on all cores.
 
     C runs without Python's lock, so the parts run at the same time. Ctrl-C ends them: their third argument becomes 1.
+    The function must keep alive what it works on: where Ctrl-C comes as a thread starts, nobody waits for this thread.
     """
     workers = min(workers or usable_cores(), vehicles)
     stop = ctypes.c_int(0)
@@ -171,9 +172,9 @@ def on_cores(
     if lanes:
         size = max(size, min(_FULL, -(-vehicles // workers)))
     with ThreadPoolExecutor(workers) as pool:
-        firsts = range(0, vehicles, size)
-        parts = [pool.submit(run_part, first, min(first + size, vehicles), stop) for first in firsts]
         try:
+            firsts = range(0, vehicles, size)
+            parts = [pool.submit(run_part, first, min(first + size, vehicles), stop) for first in firsts]
             while wait(parts, _POLL).not_done:
                 pass
         except BaseException:

@@ -94,3 +94,22 @@ def test_ctrl_c_ends_it() -> None:
         word, ended = process.stdout.read().split()
     assert (process.returncode, word) == (0, "interrupted")
     assert float(ended) - sent < 5.0
+
+
+_AS_A_THREAD_STARTS = """
+import threading
+start = threading.Thread.start
+def interrupted(thread):
+    start(thread)
+    raise KeyboardInterrupt
+threading.Thread.start = interrupted
+"""
+
+
+def test_ctrl_c_as_a_thread_starts_ends_it_too() -> None:
+    """The executor does not wait for this thread. It may work on no memory that is free again."""
+    program = _AS_A_THREAD_STARTS + _ENDLESS
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=False, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout.split()[:2]) == (0, ["begins", "interrupted"])
