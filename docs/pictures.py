@@ -230,7 +230,15 @@ def _code(content: bytes) -> str:
             node.body = [  # type: ignore[attr-defined]
                 one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
             ]
-    return ast.dump(tree)
+    return repr(_plain(tree))
+
+
+def _plain(value: object) -> object:
+    """Return a tree of code as lists, without what only some versions of Python write into it: fields with nothing."""
+    if isinstance(value, ast.AST):
+        fields = [(name, _plain(field)) for name, field in ast.iter_fields(value) if field not in (None, [])]
+        return type(value).__name__, fields
+    return [*map(_plain, value)] if isinstance(value, list) else value
 
 
 _PAGE = ("rov_fmu/report/palette.py", *(f"rov_fmu/report/templates/{name}.css.j2" for name in ("page", "plots")))
