@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from rov_fmu.io.file_kinds import PLAN, check_suffix
-from rov_fmu.io.messages import FileError, lines_on
+from rov_fmu.io.messages import FileError, lines_on, listed
 from rov_fmu.io.toml_file import (
     AS_TUPLE,
     NOT_BLANK,
@@ -36,6 +36,8 @@ _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
 """The largest number of variables in a table of a plan."""
+_DRAWN = {"runs", "seed", "sampler", "vary", "vary_from"}
+"""The keys about values that a study draws itself."""
 _ALWAYS = -1e300
 """A time before any start."""
 
@@ -193,10 +195,22 @@ def _expression(text: str) -> str:
     return text
 
 
+def _drawn_here(sampler: object) -> object:
+    """Refuse the sampler for Sobol indices, which earlier versions had."""
+    if sampler == "saltelli":
+        raise ValueError('write samples = "design.csv", a table of SALib: docs/studies.md shows how')
+    return sampler
+
+
 class Plan(Strict):
     """A study: many runs of one vehicle, of one FMU, or of one system of FMUs."""
 
     one_of = ("fmu", "vehicle", "system")
+
+    @staticmethod
+    def hint(key: str, /) -> str:
+        """Return what to write in place of keep.at, which earlier versions had."""
+        return ": write every = 1.0, for example, and take those times of the trajectories" if key == "at" else ""
 
     title: Name | None = None
     """The heading of the page."""
@@ -220,7 +234,7 @@ class Plan(Strict):
     """The number of runs. A grid has one for each of its points, and `samples` one for each row."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """The parameters of a run depend only on this and on the run's number."""
-    sampler: Literal["grid", "sobol", "latin-hypercube", "random"] = "sobol"
+    sampler: Annotated[Literal["grid", "sobol", "latin-hypercube", "random"], BeforeValidator(_drawn_here)] = "sobol"
     """The method by which the values are drawn."""
     samples: Beside | None = None
     """A CSV file with a column for each varied variable and a row for each run, such as a design of SALib."""
@@ -311,7 +325,9 @@ def _contradictions(plan: Plan) -> Iterator[str]:
         yield key_line("runs", "a grid has one run for each point: leave this key out", plan.runs)
     if plan.sampler == "grid" and plan.points > _MOST_RUNS:
         yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {plan.points:.3g}")
-    if plan.sampler != "grid" and not plan.samples and plan.runs is None:
+    if plan.samples and (other := sorted(plan.model_fields_set & _DRAWN)):
+        yield key_line("samples", f"has all that varies: leave {listed(other)} out", plan.samples)
+    elif plan.sampler != "grid" and not plan.samples and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
         yield "must have [keep] or [figures]. Otherwise nothing of a run is stored"

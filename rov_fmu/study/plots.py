@@ -1,6 +1,6 @@
 """The plots of a study's page. Each function declares one: its label, what stands above it, and how it is drawn."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ _NARROW = 1e-3
 """Below this relative variation, the numbers at an axis are long, so there are fewer of them."""
 
 
-def distribution(name: str, values: Any, told: dict[str, float], expression: str) -> dict[str, Any]:
+def distribution(name: str, values: Any, told: Mapping[str, float]) -> dict[str, Any]:
     """Plot a histogram of the values of a figure with their median, and with the range from 5 to 95 % of the runs."""
 
     def draw(ax: Axes) -> None:
@@ -36,10 +36,10 @@ def distribution(name: str, values: Any, told: dict[str, float], expression: str
         ax.set(ylabel="runs (%)")
         _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
-    return _plot(f"Distribution of {name}", draw, name, expression)
+    return _plot(f"Distribution of {name}", draw, name)
 
 
-def over_grid(name: str, expression: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+def over_grid(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     """Plot a figure over the variable with more values, with a line for some values of the other one."""
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
@@ -60,7 +60,7 @@ def over_grid(name: str, expression: str, results: Results, grid: Sequence[str])
         ax.set(xlabel=with_unit(along, results.units[along]))
         _set_ticks(ax)
 
-    return _plot(f"{name} over {' and '.join(grid)}", draw, name, expression)
+    return _plot(f"{name} over {' and '.join(grid)}", draw, name)
 
 
 def band(output: str, results: Results) -> dict[str, Any]:

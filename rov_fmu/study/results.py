@@ -44,7 +44,8 @@ class Results:
             self.warnings: tuple[str, ...] = tuple(study["warnings"])
             self._files = [path for name in study["files"] if (path := self.folder / RUNS / name).exists()]
         except (ValueError, LookupError, TypeError, RecursionError) as error:
-            raise FileError(f"{self.folder / STUDY}: is not the description of a study of this version") from error
+            words = "is not the description of a study of this version: name another folder, or use --force"
+            raise FileError(f"{self.folder / STUDY}: {words}") from error
 
     @cached_property
     def runs(self) -> pd.DataFrame:

@@ -124,6 +124,10 @@ def do_study(
         if scheduler is not None:
             raise InputError("study: leave --workers out, because the scheduler already has its workers")
     study = prepared(path)
+    if (folder / STUDY).exists() and not force:
+        from rov_fmu.study.results import Results
+
+        Results(folder)  # raises FileError about what another version or program wrote
     blocks = [*_blocks(study)]
     _clean(folder / RUNS, study, {block.name for block in blocks}, force=force)
     put_whole(Output(folder / STUDY, json.dumps(_told(study, blocks), indent=2, ensure_ascii=False).encode()))

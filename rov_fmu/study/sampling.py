@@ -1,9 +1,9 @@
 """The parameters of every run. They depend only on the plan, its seed and the number of the run."""
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import log
+from math import isclose, log
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +12,18 @@ from scipy.stats import qmc
 
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.csv_table import CsvFile, finite, read_numbers
-from rov_fmu.io.messages import listed, shown
+from rov_fmu.io.messages import first_of, listed, shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.figures import Array
 from rov_fmu.study.model import unsettable
 from rov_fmu.study.plan import Plan, Varied
 from rov_fmu.vehicle.uncertainty import NOTHING
 from rov_fmu.vehicle.vehicle import Vehicle
+
+_MOST_DRAWN = 50_000_000
+"""The largest number of values that are drawn: they take 2 GB for some time."""
+_NAMED = 5
+"""The number of names that a sentence has."""
 
 
 class Design:
@@ -28,6 +33,7 @@ class Design:
     def __init__(self, plan: Plan, path: Path, has: Mapping[str, Variable], vehicle: Vehicle | None = None) -> None:
         self._plan, self._has, self._vehicle = plan, has, vehicle
         self._rows: Array | None = None
+        self._given = plan.vary.keys() | plan.set.keys()
         if plan.samples:
             file = CsvFile(path.parent / plan.samples, None)
             _, header = next(iter(file))
@@ -37,8 +43,9 @@ class Design:
             self._rows = np.column_stack([*table.values()])
             self.runs = len(self._rows)
             return
-        known, given = (vehicle.uncertainty if vehicle else NOTHING), plan.vary.keys() | plan.set.keys()
-        some = known.part([n for n, error in zip(known.names, known.errors, strict=True) if error and n not in given])
+        known = vehicle.uncertainty if vehicle else NOTHING
+        errors = zip(known.names, known.errors, strict=True)
+        some = known.part([name for name, error in errors if error and name not in self._given])
         own = np.array([(has[n].minimum, has[n].maximum) if n in has else (0, 0) for n in some.names]).reshape(-1, 2)
         bounds = [np.maximum(some.bounds, own)[:, 0], np.minimum(some.bounds, own)[:, 1]]
         self._known = replace(some, bounds=np.column_stack(bounds))
@@ -73,17 +80,20 @@ class Design:
     def wrong(self, inputs: Mapping[str, object]) -> Iterator[str]:
         """Yield a line for each part that does not fit the FMU, or that is also in [set] or one of the inputs."""
         plan, is_grid = self._plan, self._plan.sampler == "grid"
-        if self._vehicle and not plan.samples and len(self.names) == len(plan.vary):
-            yield key_line("vary_from", "no coefficient of this vehicle has an interval", plan.vary_from)
-        if plan.samples and (plan.vary or plan.vary_from):
-            yield key_line("samples", "has all that varies: leave [vary] and vary_from out", plan.samples)
+        if self._vehicle and len(self.names) == len(plan.vary):
+            reason = "no coefficient of this vehicle that [vary] and [set] leave has an interval"
+            yield key_line("vary_from", reason, plan.vary_from)
         if plan.vary_from and is_grid:
-            yield key_line("vary_from", "a grid needs values or a range, but estimates have distributions")
-        for name in self.names:
-            key, varied = f"vary.{name}", plan.vary.get(name)
-            values = varied.extremes if varied else []
+            reason = "a grid needs values or a range, but estimates have distributions"
+            yield key_line("vary_from", reason, plan.vary_from)
+        for n, name in enumerate(self.names):
+            varied = plan.vary.get(name)
             if self._rows is not None:
-                values = self._rows[:, self.names.index(name)].tolist()
+                key, values = f"samples: {name}", self._rows[:, n].tolist()
+            elif varied:
+                key, values = f"vary.{name}", varied.extremes
+            else:
+                key, values = f"vary_from: {name}", self._known.values[n : n + 1].tolist()
             if reason := unsettable(name, self._has):
                 yield key_line(key, reason)
             elif name in plan.set or name in inputs:
@@ -94,12 +104,41 @@ class Design:
                 yield key_line(key, wrong[1], wrong[0])
         if not self.names and not is_grid:
             yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+        if self.runs * len(self.names) > _MOST_DRAWN:
+            most = f"at most {_MOST_DRAWN // len(self.names)} with {len(self.names)} variables"
+            yield key_line("runs", f"all are drawn before the first one, {most}", self.runs)
 
     def warnings(self) -> Iterator[str]:
         """Yield a sentence for each property of the results that a reader may not expect."""
-        if (vehicle := self._vehicle) and (made := vehicle.provenance) and made.verdicts and vehicle.unfit_axes:
+        if not (vehicle := self._vehicle):
+            return
+        file, known, names = self._plan.vary_from, vehicle.uncertainty, self._known.names
+        if (made := vehicle.provenance) and made.verdicts and vehicle.unfit_axes:
             axes = listed(vehicle.unfit_axes)
-            yield f"the estimates of {self._plan.vary_from} do not show how far these axes may be off: {axes}"
+            yield f"the estimates of {file} do not show how far these axes may be off: {axes}"
+        alone = [name for name in names if name not in vehicle.estimates]
+        if alone and len(names) > 1:
+            yield (
+                f"no row in [estimates] of {file}: {_some(alone)} vary as if correlated with nothing, which makes what "
+                "was found together far too uncertain"
+            )
+        for name, row in zip(known.names, known.correlation, strict=True):
+            others = [other for other, value in zip(known.names, row, strict=True) if value and other in names]
+            if name in self._given and others:
+                yield f"the plan gives {name}: its correlation with {_some(others)} in {file} is left out"
+        differ = [
+            f"{name} ({own.start:g}, not {value:g})"
+            for name, value in vehicle.coefficients.items()
+            if name not in {*names, *self._given}
+            if (own := self._has.get(name)) and not isclose(own.start, value, rel_tol=1e-9)
+        ]
+        if differ:
+            yield f"the FMU has other values than {file} of {_some(differ)}: the estimates were found beside those"
+
+
+def _some(words: Sequence[str]) -> str:
+    """Return the first words as a list in a sentence."""
+    return listed(first_of(words, _NAMED))
 
 
 def _values(varied: Varied, variable: Variable, drawn: Array) -> Array:

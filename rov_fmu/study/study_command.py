@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rov_fmu.io.messages import FileError, StudyError
+from rov_fmu.io.messages import StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table, text
 from rov_fmu.report.progress import StudyParts, parts
@@ -27,7 +27,7 @@ def study_plan(plan: Path, output: Path, *, part: str | None, force: bool, **how
     A part has no page. Raises StudyError if no run is complete, and what `do_study` raises.
     """
     targets = [(output / _PAGE, ""), (output / STUDY, "")] if output.is_dir() else ()
-    check = partial(check_targets, targets, force=force, is_ours=_is_of_a_study)
+    check = partial(check_targets, targets, force=force, is_ours=lambda path: path.name == STUDY)  # do_study tells
     check([plan])
     check([plan, *(plan.parent / name for name in load_plan(plan).files)])
     with parts() as shown:
@@ -47,16 +47,6 @@ def study_plan(plan: Path, output: Path, *, part: str | None, force: bool, **how
     print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
-
-
-def _is_of_a_study(path: Path) -> bool:
-    """Return True for the description of a study, which the same study writes again."""
-    from rov_fmu.study.results import Results
-
-    try:
-        return path.name == STUDY and bool(Results(path.parent).made_by)
-    except FileError:
-        return False
 
 
 def print_summary(results: "Results") -> None:
