@@ -70,31 +70,35 @@ class Series(dict[str, "array[float]"]):
 
 
 def read_series(
-    path: Path | str, why_wrong: Callable[[str], str | None], open_stream: OpenStream | None = None
+    path: Path | str,
+    why_wrong: Callable[[str], str | None],
+    open_stream: OpenStream | None = None,
+    *,
+    has_time: bool = True,
 ) -> Series:
     """Read variables over time: the first column is the time, which may stay but not go back, the others are variables.
 
-    `why_wrong` returns what is wrong with the name of a variable, or None. Names have no units. Each cell must be a
-    finite number, true or false. Raises DataFileError with all mistakes. `open_stream` opens the lines if `path` is not
-    the file itself, but words for its path in an archive.
+    Without `has_time`, all columns are variables. `why_wrong` returns what is wrong with the name of a variable, or
+    None. Names have no units. Each cell must be a finite number, true or false. Raises DataFileError with all mistakes.
+    `open_stream` opens the lines if `path` is not the file itself, but words for its path in an archive.
     """
     file = CsvFile(path, open_stream)
     line, header = next(iter(file))
     if all(NUMBER.fullmatch(name) for name in header):
-        words = "the first line must be a header that names the columns: the time, and then variables"
-        raise DataFileError(f"{path}: {words}")
+        words = ": the time, and then variables" if has_time else ""
+        raise DataFileError(f"{path}: the first line must be a header that names the columns{words}")
     wrong = Mistakes(path)
     for index, name in enumerate(header):
-        if reason := _why_no_variable(header, index, why_wrong):
+        if reason := _why_no_variable(header, index, why_wrong, is_time=has_time and not index):
             wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
     wrong.check()
     columns = {index: (name, lambda cell, _: finite(cell)) for index, name in enumerate(header)}
     values, lines, _, _ = read_numbers(file, header, columns, lambda cell: f" = {shown(cell)}")
     times = values[header[0]]
     for line, before, time in zip(lines[1:], times, times[1:], strict=False):
-        if time < before:
+        if has_time and time < before:
             raise DataFileError(f"{path}, line {line}: the time goes back")
-    if not lines or len(header) < 2:
+    if not lines or len(header) < 1 + has_time:
         raise DataFileError(f"{path}: {'no columns beside the time' if lines else NO_ROWS}")
     series = Series(values)
     series.lines = lines
@@ -413,13 +417,15 @@ def number_of(text: str) -> float | None:
     return number if isfinite(number) else None
 
 
-def _why_no_variable(header: Sequence[str], index: int, why_wrong: Callable[[str], str | None]) -> str | None:
-    """Return what is wrong with a name above a column of variables over time, or None."""
+def _why_no_variable(
+    header: Sequence[str], index: int, why_wrong: Callable[[str], str | None], *, is_time: bool
+) -> str | None:
+    """Return what is wrong with a name above a column of variables, or of their times, or None."""
     name = header[index]
     if name in header[:index]:
         return "this column occurs twice"
-    if index and _UNIT.search(name):
+    if not is_time and _UNIT.search(name):
         return f"must be {shown(_UNIT.sub('', name))} without a unit; a command of 30 % is 0.3 here"
     if (unit := _UNIT.search(name)) and unit[0] != " [s]":
         return "must be the time in s, which is the unit here"
-    return why_wrong(name) if index else None
+    return None if is_time else why_wrong(name)

@@ -11,8 +11,8 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from rov_fmu.fmus.variable import Variable
-from rov_fmu.io.csv_table import CsvFile, finite, read_numbers
-from rov_fmu.io.messages import first_of, listed, shown
+from rov_fmu.io.csv_table import read_series
+from rov_fmu.io.messages import first_of, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.figures import Array
 from rov_fmu.study.model import unsettable
@@ -35,10 +35,7 @@ class Design:
         self._rows: Array | None = None
         self._given = plan.vary.keys() | plan.set.keys()
         if plan.samples:
-            file = CsvFile(path.parent / plan.samples, None)
-            _, header = next(iter(file))
-            columns = {n: (name, lambda cell, _: finite(cell)) for n, name in enumerate(header)}
-            table, *_ = read_numbers(file, header, columns, lambda cell: f" = {shown(cell)}")
+            table = read_series(path.parent / plan.samples, lambda name: unsettable(name, has), has_time=False)
             self.names = [*table]
             self._rows = np.column_stack([*table.values()])
             self.runs = len(self._rows)

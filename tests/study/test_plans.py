@@ -37,16 +37,22 @@ WHOLE = {
     HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be greater than or equal to 1",
     HEAD.replace("4", "1000000000") + VARY + TAIL: "runs = 1000000000: must be less than or equal to 100000000",
     HEAD.replace("runs = 4", "") + VARY + TAIL: "runs: this key is missing",
+    HEAD.replace("4", "50000001") + VARY + TAIL: (
+        "runs = 50000001: all are drawn before the first one, at most 50000000 with 1 variables"
+    ),
     HEAD + "[vary]\nu_l.values = [0.0]\n[inputs]\nu_l = 0.5\n" + TAIL: "vary.u_l: is given in [set] or [inputs] too",
 }
 """Plans and the beginnings of the messages about them."""
 HEADS = {
     'sampler = "soboll"': "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube' or 'random'",
+    'sampler = "saltelli"': """sampler = 'saltelli': write samples = "design.csv", a table of SALib: docs/studies.md""",
     'vehicle = "videoray"': "must have one of fmu, vehicle or system",
+    'samples = "design.csv"': "samples = 'design.csv': has all that varies: leave runs and vary out",
     'vary_from = "mine.toml"': "vary_from = 'mine.toml': there is no such file beside the plan",
-    'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle has an interval",
+    'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle that [vary] and [set] leave has",
     "time_limit = 0": "time_limit = 0: must be greater than 0",
     "time_limit = 2e6": "time_limit = 2000000.0: must be less than or equal to 1000000",
+    'sampler = "latin-hypercube"\nseed = 2.5': "seed = 2.5: must be a whole number",
     "seed = -1": "seed = -1: must be greater than or equal to 0",
 }
 """Keys before the tables."""
@@ -77,6 +83,7 @@ TABLES = {
     "[inputs]\nu_l = {}": "inputs.u_l: must have one of steps or ramps",
     "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.55, 0.5], [0.55, 0.0]]": "inputs.u_l: a jump at 0.55 s must be",
     '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
+    '[keep]\noutputs = ["u"]\nat = [0.5]': "keep.at: there is no such key: write every = 1.0, for example, and take",
     '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",
     '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must be a multiple of step = 0.1, and within a run",
     '[keep]\noutputs = ["u"]\nevery = 0.25': "keep.every = 0.25: must be a multiple of step = 0.1",
@@ -121,6 +128,36 @@ def test_a_mistake_is_a_line(text: str, message: str, tmp_path: Path, videoray_f
     first, *others = mistakes(plan)
     assert any(line.startswith(f"{plan}: {message}") for line in (first, *others))
     assert not (others and text.startswith(HEAD))
+
+
+SAMPLES = {
+    "alpha_u,m_rov\n1.0,6.5\n1.2,6.6\n": "",
+    "": "design.csv: the file is empty",
+    "alpha_u,alpha_u\n1.0,1.1\n": "design.csv, line 1, column 'alpha_u': this column occurs twice",
+    "1.0,1.1\n1.0,1.1\n": "design.csv: the first line must be a header that names the columns",
+    "alpha_u\n": "design.csv: no rows below the header",
+    "alpha_u\nnan\n": "design.csv, line 2, column 'alpha_u' = 'nan': must be a finite number",
+    "alpha_u\n1.0\n-1.0\n": "plan.toml: samples: alpha_u = -1.0: must be within 0 ... 1000",
+    "alpha_uu\n1.0\n": "design.csv, line 1, column 'alpha_uu': the FMU has no variable 'alpha_uu'",
+    "beta_u\n1.0\n": "plan.toml: samples: beta_u: is given in [set] or [inputs] too",
+}
+"""Tables of samples, and the end of the message about them."""
+
+
+@pytest.mark.parametrize(("table", "message"), SAMPLES.items(), ids=SAMPLES.values())
+def test_samples_give_a_run_for_each_row(table: str, message: str, tmp_path: Path, videoray_fmu: Path) -> None:
+    shutil.copy(videoray_fmu, tmp_path)
+    (tmp_path / "design.csv").write_text(table)
+    plan = tmp_path / "plan.toml"
+    head = HEAD.replace("runs = 4", 'samples = "design.csv"')
+    plan.write_text(f"{head}set = {{ beta_u = 0.9 }}\n{TAIL}")
+    if message:
+        (line,) = mistakes(plan)
+        assert message in line
+        return
+    study = prepared(plan)
+    assert study.varied == ["alpha_u", "m_rov"]
+    assert study.rows.tolist() == [[1.0, 6.5], [1.2, 6.6]]
 
 
 @pytest.mark.parametrize("case", WRONG_PATHS)

@@ -197,6 +197,24 @@ def test_rows_of_another_plan_are_not_replaced_unasked(foreign: Foreign, tmp_pat
     assert len(pd.read_parquet(folder / "runs")) == 4
 
 
+def test_a_folder_of_an_earlier_version_is_refused_in_one_line(
+    foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its description named no files of blocks."""
+    folder, plan = tmp_path / "results", _plan(tmp_path, foreign(), 2)
+    (folder / "runs").mkdir(parents=True)
+    (folder / "runs" / "part-000000000-000000001.parquet").write_bytes(b"PAR1")
+    (folder / "study.json").write_text('{"format": 2, "made_by": "rov-fmu 0.2.0", "runs": 2, "plan": {}}')
+    words = "study.json: is not the description of a study of this version: name another folder, or use --force"
+    for call in (lambda: Results(folder), lambda: run_study(plan, folder, workers=1)):
+        with pytest.raises(FileError, match=words):
+            call()
+    assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
+    assert without_progress(capsys.readouterr().err) == f"rov-fmu: {folder / words}\n"
+    assert main(["study", str(plan), "-o", str(folder), "--workers", "1", "--force"]) == 0
+    assert len(Results(folder).runs) == len([*(folder / "runs").iterdir()]) == 2
+
+
 def test_what_cannot_be_done_is_a_line(
     foreign: Foreign, tmp_path: Path, whole: Results, capsys: pytest.CaptureFixture[str]
 ) -> None:
