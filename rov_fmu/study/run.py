@@ -245,7 +245,8 @@ def _parquet(study: Study, rows: Sequence[_Row]) -> bytes:
         lists = {TIME: "f8", **{name: study.model.variables[name].dtype for name in study.plan.kept}}
         kinds[TRAJECTORY] = pa.struct([(name, pa.list_(pa.from_numpy_dtype(kind))) for name, kind in lists.items()])
     sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_pylist([*rows], pa.schema(kinds)), sink, compression="zstd", write_page_checksum=True)
+    table = pa.Table.from_pylist([*rows], pa.schema(kinds))
+    pq.write_table(table, sink, compression="zstd", use_dictionary=False, write_page_checksum=True)
     return sink.getvalue().to_pybytes()  # type: ignore[no-any-return]
 
 
