@@ -6,7 +6,6 @@ those it was given.
 """
 
 import ast
-import operator
 from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import pairwise
@@ -26,7 +25,11 @@ _SYNTAX = (
     *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.IfExp, ast.Call, ast.Name, ast.Constant),
     *(ast.Subscript, ast.Slice, ast.Load, ast.keyword, ast.operator, ast.unaryop, ast.boolop),
 )
-_COMPARISONS = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
+_COMPARISONS = {
+    **{ast.Lt: "less", ast.LtE: "less_equal", ast.Gt: "greater", ast.GtE: "greater_equal"},
+    **{ast.Eq: "equal", ast.NotEq: "not_equal"},
+}
+"""The functions of NumPy, because `~` of Python's True is a number that is true."""
 _MOST_DECIMALS = 300
 _LONGER = ast.LShift | ast.RShift | ast.MatMult
 _ALLOWED = "an expression has numbers, variables, operators, indices and the functions that docs/studies.md lists"
@@ -129,6 +132,14 @@ class _Reader(ast.NodeTransformer):
             return _call("_power", self.visit(node.left), self.visit(node.right))
         return self.generic_visit(node)
 
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        found: Any = self.generic_visit(node)
+        return _call("_truth", found)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        found: Any = self.generic_visit(node)
+        return _call("_truth", found) if isinstance(node.op, ast.Not) else found
+
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         if not all(type(op) in _COMPARISONS for op in node.ops):
             return self.generic_visit(node)
@@ -166,7 +177,7 @@ def _call(name: str, *given: ast.expr) -> ast.Call:
 def _compared(words: str, *values: Any) -> Any:
     """Compare values as 0 < y < 1 does, element by element."""
     pairs = zip(words.split(), pairwise(values), strict=True)
-    return reduce(np.logical_and, (getattr(operator, word)(*pair) for word, pair in pairs))
+    return reduce(np.logical_and, (getattr(np, word)(*pair) for word, pair in pairs))
 
 
 def _slice(array: Any, *ends: Any) -> Any:
@@ -193,6 +204,7 @@ def _within(decimals: int) -> int:
 
 _OWN = {
     "_power": np.float_power,
+    "_truth": lambda value: np.bool_(bool(value)),
     "_slice": _slice,
     "_index": _index,
     "_places": np.flatnonzero,

@@ -47,6 +47,8 @@ KNOWN = {
     "sorted(-t)[0] + t[::2][5] + t[-2:][0]": 0.09,
     "(1 if m > 6 else 2) + (0 < m < 6) + (m > 6 or m / 0) + (not m)": 2.0,
     "((m > 6) ^ (m > 7)) * 1 + (m != 6.5) * 2 + any(t > 3) * 4 + all(t > 0) * 8": 5.0,
+    "~(m < 6) + ~(not m) * 2 + ~(m > 6 and m > 7) * 4": 7.0,
+    "(m or 0) + (m and 3) * 2": 3.0,
     "median(t) + percentile(t, 25) + searchsorted(t, 0.995) + hypot(3, 4)": 135.0,
 }
 

@@ -111,8 +111,8 @@ def test_a_run_that_ends_its_process_or_does_not_return_fails_alone(
 ) -> None:
     (tmp_path / "rows.csv").write_text(f"a,mode\n0.5,0\n0.5,{mode}\n0.5,0\n")
     plan = _plan(tmp_path, foreign(), limit=2.0)
-    head, _, tail = plan.read_text().partition("[inputs]")
-    head += 'samples = "rows.csv"\n[inputs]' + tail.partition("[vary]")[0]
+    text = plan.read_text().partition("[vary]")[0]
+    head = text.replace("runs = 40\nseed = 5\n", 'samples = "rows.csv"\n')
     plan.write_text(head + "[figures]\nend = 'y[-1]'\n")
     runs = run_study(plan, tmp_path / "results", workers=1).runs
     assert runs.status.tolist() == ["done", "failed", "done"]
