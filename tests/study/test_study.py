@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import dask
 import numpy as np
 import pandas as pd
 import pytest
@@ -177,7 +178,10 @@ def test_workers_of_dask_give_the_same_bits(
 @posix
 @pytest.mark.long
 def test_the_runs_of_a_worker_that_dies_are_repeated(foreign: Foreign, tmp_path: Path, whole: Results) -> None:
-    with LocalCluster(n_workers=2, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
+    with (
+        dask.config.set({"temporary-directory": str(tmp_path)}),
+        LocalCluster(n_workers=2, dashboard_address="127.0.0.1:0") as cluster,
+    ):
 
         def kill(now: StudyProgress) -> None:
             if now.done == 5:
