@@ -56,7 +56,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 if TYPE_CHECKING:
     from rov_fmu.study.results import Results
 
-_OF_VEHICLE, _OF_FMU = 500, 20
+_OF_VEHICLE, _OF_FMU = 500, 50
 """The most runs of a block."""
 _AT_ONCE = 4_000_000
 """The most recorded values of a block, which are in memory."""
@@ -185,7 +185,7 @@ def _blocks(study: Study) -> Iterator[Block]:
     most = max(1, min(_OF_VEHICLE, _AT_ONCE // (max(len(study.recorded), 1) * len(study.plan.times))))
     digest, first = study.digest, 0
     while first < len(study.rows):
-        values = study.rows[first : first + (most if study.model.vehicle else min(_OF_FMU, first // 32 + 1))]
+        values = study.rows[first : first + (most if study.model.vehicle else min(_OF_FMU, first // 16 + 1))]
         yield Block(first, values, f"{first:09d}-{digest}-{sha256(values.tobytes()).hexdigest()[:12]}.parquet")
         first += len(values)
 
