@@ -25,7 +25,7 @@ from rov_fmu.identify.likelihood.kinds import PRIORS
 from rov_fmu.identify.result import CONSTANTS
 from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
-from rov_fmu.report.page import equations
+from rov_fmu.report.page.equations import equations_of
 from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.plots.svg import name_axes, svg_file
 from rov_fmu.report.templates import number
@@ -290,10 +290,9 @@ def _first_sentence(words: str) -> str:
 
 
 def _equations(name: str) -> str:
-    """The forces and the thrust of a vehicle that ships, a line each."""
-    rows = equations.equations_of(load_vehicle(SHIPPED[name]).layout)
-    told = (row for row in rows if "z±" not in row[2] and "_out" not in row[2])
-    return "\n".join(f"{of:<14} {what:<52} {formula}" for of, what, formula in told)
+    """The equations of a vehicle that ships, a line for each term, with what it is behind."""
+    rows = [row for line in equations_of(load_vehicle(SHIPPED[name]).layout) for row in line.rows()]
+    return "\n".join(f"{left:>11} {term:<60} {words}" for left, term, words in rows)
 
 
 def _terminals() -> Table:

@@ -299,8 +299,6 @@ class Language:
     An operation that is not among them is a call, which binds with CALL and whose operands need no brackets."""
     number: Callable[[float], str] = repr
     bracket: str = "({})"
-    is_code: bool = True
-    """True if an operation without a form is written as a + b or f(a, b). False if it cannot be written."""
 
 
 C = Language(
@@ -322,7 +320,7 @@ def written(
 ) -> str:
     """Write an expression in a language, in brackets if it binds less than the rank `least`.
 
-    `name_of` says how a name is written. Raises ValueError if the language has no form for an operation.
+    `name_of` says how a name is written.
     """
     match x:
         case Name():
@@ -343,8 +341,6 @@ def written(
 
 def _usual_form(x: Operation, language: Language) -> str:
     """Return the form of an operation for which a language has none of its own: a + b or f(a, b)."""
-    if not language.is_code:
-        raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
     return f"{{}} {x.op} {{}}" if x.op in language.ranks else f"{x.op}({', '.join('{}' for _ in x.args)})"
 
 

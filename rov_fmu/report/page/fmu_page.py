@@ -88,7 +88,7 @@ def documentation_page(
         + [*layout.initial],
         card=card(vehicle),
         speeds=[*speed_table(vehicle)],
-        equations=[*equations_of(layout)],
+        equations=[[*line.rows()] for line in equations_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         live=live([FlyingVehicle(vehicle, module)]) if module and layout.actuators else None,
         start=start,
