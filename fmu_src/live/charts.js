@@ -1,7 +1,7 @@
 // The charts of a flight over time, and its tracks from above.
 
-/** A line of a chart: whose it is, its times, its value at the n-th of them, and half of its band, if it has one.
- * @typedef {{kind: "own" | "ghost" | "measured", times: number[], value: (n: number) => number, band?: (n: number) => number}} Trace */
+/** A line of a chart: whose it is, its times, and its value at the n-th of them.
+ * @typedef {{kind: "own" | "ghost" | "measured", times: number[], value: (n: number) => number}} Trace */
 /** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, the axis whose V_ss and Tau
  * it marks, the number of the recording's signal that the second line is, and the commands that act on it, if any.
  * `more` follows where it fits; `factor` is how many of the unit one SI unit is.
@@ -26,27 +26,14 @@ const PANELS = {
     return signals.length ? axisPanels(flight, (a) => signals.find(({ axis }) => axis === a)?.isPosition ?? false) : [];
   },
   error: ({ replay, pilot }) =>
-    (replay?.recording.signals ?? []).map(({ axis, isPosition, times, band }, s) => {
+    (replay?.recording.signals ?? []).map(({ axis, isPosition, times }, s) => {
       const own = pilot.model.vehicle.axes[axis];
-      const line = { times, values: replay?.errors[s] ?? [], band };
-      return banded(own.name, "error", unitOf(own, isPosition), 3, line, factorOf(own));
-    }),
-  force: ({ replay, pilot }) =>
-    (replay?.recording.forces ?? []).map((force) => {
-      const { name, unit } = pilot.model.vehicle.axes[force.axis];
-      return banded(name, "unknown", unit.startsWith("rad") ? "N m" : "N", 2, force);
+      const [factor, values] = [factorOf(own), replay?.errors[s] ?? []];
+      const value = (/** @type {number} */ n) => factor * (values[n] ?? 0);
+      const unit = unitOf(own, isPosition);
+      return { id: own.name, title: `${own.name}: error`, unit, digits: 3, traces: [{ kind: "own", times, value }] };
     }),
 };
-
-/** Returns a chart of one line of a recording, and of its band, if there is one. @param {string} id The name of the axis.
- * @param {string} what @param {string} unit @param {number} digits @param {Band & {band?: Band}} line @param {number} factor How many of
- * the unit one SI unit is. @returns {Graph} */
-function banded(id, what, unit, digits, { times, values, band }, factor = 1) {
-  /** @type {Trace} */
-  const trace = { kind: "own", times, value: (n) => factor * (values[n] ?? 0) };
-  if (band) trace.band = (n) => factor * between(band.times, (k) => band.values[k], times[n]);
-  return { id, title: `${id}: ${what}`, unit, digits, traces: [trace] };
-}
 
 /** Returns a chart for each axis: of its position or of its velocity. In a recording, the second line is what was measured.
  * @param {Flight} flight @param {(a: number) => boolean} ofPosition @returns {Graph[]} */
@@ -151,10 +138,8 @@ class Chart {
     /** What it says: its title with the present value, and words beside it. */
     this.title = "";
     this.words = "";
-    /** Where it marks Tau, in px. */
-    /** @type {number[] | null} */
+    /** Where it marks Tau, in px. @type {number[] | null} */
     this.Tau = null;
-    /** @type {number[] | null} */
     this.fit();
   }
 
@@ -169,7 +154,7 @@ class Chart {
    * @param {number | null} pointed The place of the pointer, from 0 to 1 of the span. */
   draw(flight, span, ghost, pointed) {
     const { board } = this;
-    const { ink, blue, orange, page, muted } = board.colours;
+    const { ink, blue, page, muted } = board.colours;
     const { axis } = this.panel;
     const traces = this.panel.traces.filter(({ kind }) => ghost || kind !== "ghost");
     const { time } = flight;
@@ -181,6 +166,7 @@ class Chart {
     const { factor = 1 } = this.panel;
     const [steady, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
     const V = marked && flight.floats(axis, steady) ? 0 : factor * steady;
+    const windows = traces.map(({ times }) => [placeOf(times, start), placeOf(times, time)]);
     const levels = axis === undefined ? [] : [0, V];
     const [low, high, step] = rangeOf(levels, traces, windows, bottom - top);
     const px = (/** @type {number} */ t) => Math.max(left, left + ((t - start) / span) * (right - left));
@@ -216,7 +202,7 @@ class Chart {
         muted,
         1,
       );
-    this.words = this.marks(flight, traces, at, isPointed, hasSteady ? V : null, fromRest ? Tau : null).join(" · ");
+    this.words = this.marks(flight, traces[1], at, isPointed, hasSteady ? V : null, fromRest ? Tau : null).join(" · ");
     this.title = `${this.panel.title} ${this.reading(traces[0], at, time)} ${this.panel.unit}`;
     const all = [this.title, this.panel.more].filter(Boolean).join(" ");
     const fits = board.measure(all, true) + (isSecondLine ? 0 : board.measure(this.words, false)) + 12 < right;
@@ -236,38 +222,27 @@ class Chart {
     return shown(between(times, value, Math.min(at, time)), this.panel.digits);
   }
 
-  /** Returns the words beside the title. @param {Flight} flight @param {Trace[]} traces @param {number} at The time. @param {boolean} isPointed
+  /** Returns the words beside the title. @param {Flight} flight @param {Trace | undefined} other @param {number} at The time.
+   * @param {boolean} isPointed
    * @param {number | null} V @param {number | null} Tau */
-  marks({ time, replay }, [mine, other], at, isPointed, V, Tau) {
+  marks({ time, replay }, other, at, isPointed, V, Tau) {
     const { signal, digits, factor = 1 } = this.panel;
     const words = [];
     if (signal !== undefined && replay && other) {
-      const half = replay.recording.signals[signal].band;
-      const error = shown(factor * (replay.errors[signal][placeOf(other.times, Math.min(at, time))] ?? 0), digits);
-      words.push(
-        `error ${error}${half ? ` ± ${shown(factor * between(half.times, (k) => half.values[k], at), digits)}` : ""}`,
-      );
+      const error = replay.errors[signal][placeOf(other.times, Math.min(at, time))] ?? 0;
+      words.push(`error ${shown(factor * error, digits)}`);
     } else if (isPointed && other) words.push(`ghost ${this.reading(other, at, time)}`);
-    else if (isPointed && mine.band) words.push(`± ${shown(mine.band(placeOf(mine.times, at)), digits)}`);
     else if (V !== null && !isPointed)
       words.push(`V_ss ${shown(V, digits)}`, ...(Tau !== null ? [`Tau ${shown(Tau, 2)} s`] : []));
     if (isPointed) words.push(`at ${shown(at, 2)} s`);
     return words;
   }
 
-  /** Draws a line with its band. @param {Trace} trace @param {number[]} window @param {(t: number) => number} px
-   * @param {(v: number) => number} py */
+  /** Draws a line. @param {Trace} trace @param {number[]} window @param {(t: number) => number} px @param {(v: number) => number} py */
   trace(trace, window, px, py) {
-    const { board } = this;
-    const { blue, grey, orange } = board.colours;
-    const { band, kind } = trace;
-    if (band) {
-      const upper = lineOf({ ...trace, value: band }, window, px, py);
-      const lower = lineOf({ ...trace, value: (n) => -band(n) }, window, px, py);
-      board.area([[...upper, ...lower.reverse()]], blue, "", 0.15);
-    }
-    const [colour, dash] = { own: [blue, []], ghost: [grey, []], measured: [orange, [2, 3]] }[kind];
-    board.line(lineOf(trace, window, px, py), /** @type {string} */ (colour), 1.8, /** @type {number[]} */ (dash));
+    const { blue, grey, orange } = this.board.colours;
+    const [colour, dash] = { own: [blue, []], ghost: [grey, []], measured: [orange, [2, 3]] }[trace.kind];
+    this.board.line(lineOf(trace, window, px, py), /** @type {string} */ (colour), 1.8, /** @type {number[]} */ (dash));
   }
 
   /** Draws a strip at the foot of the chart while a command is beyond the tested range. @param {Flight} flight @param {string[]} commands
@@ -309,11 +284,10 @@ class Chart {
  * @param {number[]} levels @param {Trace[]} traces @param {number[][]} windows @param {number} height */
 function rangeOf(levels, traces, windows, height) {
   let [low, high] = [Math.min(...levels), Math.max(...levels)];
-  traces.forEach(({ value, band }, t) => {
+  traces.forEach(({ value }, t) => {
     for (let n = windows[t][0]; n <= windows[t][1]; n++) {
-      const [one, half] = [value(n), band?.(n) ?? 0];
-      low = Math.min(low, one, half ? -half : one);
-      high = Math.max(high, one, half || one);
+      low = Math.min(low, value(n));
+      high = Math.max(high, value(n));
     }
   });
   const step = roundUp(Math.max((high - low) / Math.max(1, Math.min(3.5, height / 24 - 1)), 0.05));

@@ -457,9 +457,7 @@ class Live {
     this.arrange("velocities");
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
     this.paused = false;
-    this.say(
-      `${name} ${Math.round(test.command * 100)} % from rest.`,
-    );
+    this.say(`${name} ${Math.round(test.command * 100)} % from rest.`);
     this.show();
   }
 
@@ -679,7 +677,6 @@ class Live {
     const all = this.charts.flatMap(({ panel }) => panel.traces);
     part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis === undefined);
     part("measured").hidden = !all.some(({ kind }) => kind === "measured");
-    part("banded").hidden = !all.some(({ band }) => band);
     part("grey").hidden = !flight.ghostShown;
     const untested = vehicle.commands.filter((name) => isBeyond(vehicle, model.get(name)));
     part("untested").hidden = untested.length === 0;

@@ -365,7 +365,7 @@ class Flight {
     this.set(Object.fromEntries(own));
   }
 
-  /** Flies a published step test: from rest, with all other inputs at their start values. @param {StepTest} test */
+  /** Flies a step test: from rest, with all other inputs at their start values. @param {StepTest} test */
   run(test) {
     const { vehicle } = this.pilot.model;
     const { signs } = vehicle.axes[test.axis];

@@ -9,15 +9,12 @@ const RENAMING = "if another header stands for it, rename that one: this page do
 /** The error of a file that is not a recording of this vehicle. Its text says why. */
 class Unreadable extends Error {}
 
-/** Half of a 95 % band over time. @typedef {{times: number[], values: number[]}} Band */
-/** The measurements of an axis: positions or velocities at their own times, and the band of the errors of predictions, if it is known.
- * @typedef {{axis: number, isPosition: boolean, times: number[], values: number[], band?: Band}} Signal */
-/** An unknown force along an axis, with its band. @typedef {{axis: number, times: number[], values: number[], band?: Band}} Force */
+/** The measurements of an axis: positions or velocities at their own times.
+ * @typedef {{axis: number, isPosition: boolean, times: number[], values: number[]}} Signal */
 /**
- * A recording: the times in s from which commands hold, the commands by name, or the loads of a wrench, signals, unknown forces, sentences
- * about what is not as in the file, and the number of rows that were left out.
- * @typedef {{name: string, times: number[], commands: Record<string, number[]>, signals: Signal[], forces: Force[], notes: string[],
- *   left: number}} Recording
+ * A recording: the times in s from which commands hold, the commands by name, or the loads of a wrench, signals, sentences about what is not
+ * as in the file, and the number of rows that were left out.
+ * @typedef {{name: string, times: number[], commands: Record<string, number[]>, signals: Signal[], notes: string[], left: number}} Recording
  */
 
 /** Reads a recording. @param {string} text @param {string} name The file's name. @param {Vehicle} vehicle @returns {Recording} */
@@ -104,7 +101,6 @@ function readRecording(text, name, vehicle) {
       times: times.filter((_, n) => Number.isFinite(values[n])),
       values: values.filter(Number.isFinite),
     })),
-    forces: [],
     notes: [...(reason ? [`The pressure is not used: ${reason}.`] : []), ...nearness(off)],
     left: lines.length - begin - 1 - rows.length,
   };
@@ -339,7 +335,7 @@ function timeColumns(headers, rows, columns, rules) {
   const named = dates.find((n) => headers[n].trim().toLowerCase() === "date");
   return {
     time,
-    date: named ?? dates.find((n) => rules.days.some((form) => dayOf(dateIn(cells[n], rules), form) !== null)) ?? -1,
+    date: named ?? dates.find((n) => Number.isFinite(dayOf(dateIn(cells[n], rules), rules))) ?? -1,
   };
 }
 
@@ -352,117 +348,52 @@ function wordsIn(header) {
   return plain.toLowerCase().match(/\p{L}+|\d+/gu) ?? [];
 }
 
-const MONTHS = "january february march april may june july august september october november december".split(" ");
 const DATE_PARTS = /** @type {Record<string, string>} */ ({
   Y: "(?<Y>\\d{4})",
-  y: "(?<y>\\d\\d)",
   m: "(?<m>\\d\\d?)",
   d: "(?<d>\\d\\d?)",
 });
+const DAY = 86400;
 
-/** Returns the number of days since 1970 of a date, or null for one in another form. @param {string} text @param {string} form */
-function dayOf(text, form) {
-  const pattern = form.replace(/[.]/g, "\\.").replace(/%(.)/g, (_, part) => DATE_PARTS[part] ?? "(?<b>[a-z]+)");
-  const found = new RegExp(`^${pattern}$`, "i").exec(text)?.groups;
-  if (!found) return null;
-  const word = found.b?.toLowerCase();
-  const month = word ? MONTHS.findIndex((one) => one === word || one.slice(0, 3) === word) : Number(found.m) - 1;
-  const year = Number(found.Y ?? found.y) + (found.Y ? 0 : Number(found.y) > 68 ? 1900 : 2000);
-  const date = new Date(Date.UTC(year, month, Number(found.d)));
-  return date.getUTCMonth() === month && date.getUTCDate() === Number(found.d) ? date.getTime() / 864e5 : null;
-}
-
-/** Returns the days since 1970 of dates, NaN for other texts, or null without any. It must equal `_days` of
- * rov_fmu/tank/readers/times_of_day.py. @param {string[]} texts @param {ClockRules} rules */
-function daysOf(texts, rules) {
-  const distinct = [...new Set(texts.filter((text) => text))];
-  const read = rules.days.map((form) => {
-    const days = new Map(distinct.map((text) => [text, dayOf(text, form)]));
-    const known = [...days.values()].filter((day) => day !== null);
-    return { days, count: known.length, span: Math.max(...known) - Math.min(...known) };
-  });
-  const most = Math.max(...read.map(({ count }) => count));
-  if (most === 0) return null;
-  const possible = read.filter(({ count }) => count === most);
-  const span = Math.min(...possible.map((one) => one.span));
-  const [first, ...others] = possible
-    .filter((one) => one.span === span)
-    .map(({ days }) => texts.map((text) => days.get(text) ?? Number.NaN));
-  const start = first.find(Number.isFinite) ?? 0;
-  const row = first.indexOf(start);
-  if (others.some((days) => days.some((day, n) => day - days[row] !== first[n] - start && Number.isFinite(day)))) {
-    throw new Unreadable("its dates may begin with the day or with the month");
+/** Returns the number of days since 1970 of a date, or NaN for another text. @param {string} text @param {ClockRules} rules */
+function dayOf(text, { days }) {
+  for (const form of days) {
+    const pattern = form.replace(/[.]/g, "\\.").replace(/%(.)/g, (_, part) => DATE_PARTS[part]);
+    const found = new RegExp(`^${pattern}$`).exec(text)?.groups;
+    if (!found) continue;
+    const [year, month, day] = [found.Y, found.m, found.d].map(Number);
+    const date = new Date(Date.UTC(year, month - 1, day));
+    if (date.getUTCMonth() === month - 1 && date.getUTCDate() === day) return date.getTime() / (1000 * DAY);
   }
-  return others.some((days) => days[row] !== start) ? first.map((day) => day - start) : first;
+  return Number.NaN;
 }
 
 /** Returns the times of rows with times of day, s, or NaN. It must equal `times_of_day` of rov_fmu/tank/readers/times_of_day.py, which
  * says why. @param {string[][]} rows @param {number} time @param {number} date @param {ClockRules} rules */
 function timesOfDay(rows, time, date, rules) {
-  const texts = rows.map((cells) => cells[time] ?? "");
-  const inside = texts.map((text) => dateIn(text, rules));
-  const own = daysOf(
-    inside.map((text, n) => (clockPattern(rules).test(texts[n]) ? text : "")),
-    rules,
-  );
-  const days =
-    own ??
-    daysOf(
-      rows.map((cells) => dateIn(cells[date] ?? "", rules)),
-      rules,
-    );
-  const parts = texts.flatMap((text, row) => {
+  const parts = rows.flatMap((cells, row) => {
+    const text = cells[time] ?? "";
     const found = clockPattern(rules).exec(text);
-    if (!found || (days ? !Number.isFinite(days[row]) : false) || (!own && inside[row])) return [];
-    const others = found[2].slice(1).split(":").map(Number);
+    if (!found) return [];
+    const [minutes, whole] = found[2].slice(1).split(":").map(Number);
     const decimals = found[3] ? Number(`0.${found[3].slice(1)}`) : 0;
-    const after = (others.length > 1 ? 60 * others[0] + others[1] : others[0]) + decimals;
-    return [
-      {
-        row,
-        first: Number(found[1]),
-        after,
-        isLong: others.length > 1,
-        hasDecimals: !!found[3],
-        half: found[4]?.toLowerCase(),
-      },
-    ];
+    const day = dayOf(dateIn(text, rules) || dateIn(cells[date] ?? "", rules), rules);
+    return [{ row, clock: 3600 * Number(found[1]) + 60 * minutes + whole + decimals, day }];
   });
-  const short = parts.filter(({ isLong }) => !isLong);
-  const hasHalf = parts.some(({ half }) => half);
-  const isMinutes =
-    short.length > 0 && (parts.some((one) => one.isLong || one.hasDecimals) || short.some(({ first }) => first >= 24));
-  if (short.length > 0 && !isMinutes && !hasHalf && !days) {
-    throw new Unreadable("its times may be hours and minutes, or minutes and seconds");
-  }
-  const clock = parts.map(({ first, after, isLong, half }) => {
-    const unit = !isLong && isMinutes ? 60 : 3600;
-    return unit * (half ? (first % 12) + (half === "p" ? 12 : 0) : first) + (isLong ? 1 : unit / 60) * after;
-  });
-  const firsts = parts.map(({ first }) => first);
-  const most = Math.max(...firsts);
-  const isOf12 =
-    !hasHalf &&
-    Math.min(...firsts) >= 1 &&
-    most <= 12 &&
-    firsts.some((one, n) => n && one === 1 && firsts[n - 1] === 12);
-  const isHour = isMinutes && short.length === parts.length;
-  const period = isHour ? (most < 60 ? 3600 : Infinity) : isOf12 ? 43200 : most < 24 ? 86400 : Infinity;
+  const isOfDay = parts.every(({ clock }) => clock < DAY);
   let turns = 0;
-  const goesOn = clock.map((one, n) => {
-    if (period === Infinity) return one;
-    if (n) turns -= Math.round(((one % period) - (clock[n - 1] % period)) / period);
-    return (one % period) + period * turns;
+  const goesOn = parts.map(({ clock }, n) => {
+    if (n && isOfDay) turns -= Math.round((clock - parts[n - 1].clock) / DAY);
+    return clock + DAY * turns;
   });
-  const dayOfRow = parts.map(({ row }) => days?.[row] ?? 0);
-  const isApart = clock.some((one, n) => {
-    const [later, on] = n ? [dayOfRow[n] - dayOfRow[n - 1], one - clock[n - 1]] : [0, 0];
-    return later === 0 ? on < -43200 : on >= 0 && on < 60;
-  });
-  const isDated = days && period === 86400 && !isApart;
+  const isDated = parts.every(({ day }) => Number.isFinite(day));
+  const isApart = parts.some(
+    ({ day, clock }, n) => n > 0 && day === parts[n - 1].day && clock - parts[n - 1].clock < -DAY / 2,
+  );
+  const first = parts[0]?.day || 0;
   const times = rows.map(() => Number.NaN);
-  for (const [n, { row }] of parts.entries()) {
-    times[row] = isDated ? 86400 * dayOfRow[n] + clock[n] : 86400 * (dayOfRow[0] ?? 0) + goesOn[n];
+  for (const [n, { row, clock, day }] of parts.entries()) {
+    times[row] = isDated && !isApart ? DAY * day + clock : DAY * first + goesOn[n];
   }
   return times;
 }

@@ -1,4 +1,4 @@
-"""A log as the page that flies reads it: the commands of the vehicle, what was measured.
+"""A log as the page that flies reads it: the commands of the vehicle, and what was measured.
 
 Any format that `rov-fmu identify` reads is converted, with the tables [columns], [topics], [dives] and [logs] of the
 rov.toml beside the file. Of a dive of several files, all are read, whichever is named. Nothing is resampled: commands
@@ -50,7 +50,6 @@ def recording_of(path: Path, vehicle: Vehicle) -> dict[str, Any]:
         "times": _rounded(times - start),
         "commands": commands,
         "signals": signals,
-        "forces": [],
         "notes": [],
         "left": 0,
     }
