@@ -20,9 +20,11 @@
  * @typedef {{name: string, also: string[], kind: string, gains: Record<string, number>, shares: Record<string, number>}} CommandColumn
  */
 /**
- * The rules by which times of day are read, from rov_fmu/tank/readers/times_of_day.py: the pattern of one, and of what is between it and a
- * date; the forms of dates; the number of first rows that tell which columns are these; and the words in their headers.
- * @typedef {{pattern: string, between: string, days: string[], firstRows: number, titles: string[], dates: string[]}} ClockRules
+ * The rules by which times of day are read, from rov_fmu/tank/readers/times_of_day.py: the pattern of one, of what one in any form contains,
+ * and of what is between it and a date; the forms of dates; what to write in place of other forms; the number of first rows that tell which
+ * columns are these; and the words in their headers.
+ * @typedef {{pattern: string, like: string, between: string, days: string[], how: string, firstRows: number, titles: string[],
+ *   dates: string[]}} ClockRules
  */
 /**
  * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the patterns of a number, of a cell of a row, of a number

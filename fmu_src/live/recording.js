@@ -325,7 +325,7 @@ function timeColumns(headers, rows, columns, rules) {
   const has = (n, known) =>
     words[n].some((word) => known.some((one) => word === one || (one.length > 4 && word.endsWith(one))));
   const places = headers.map((_, n) => n);
-  const times = places.filter((n) => clockPattern(rules).test(cells[n]) && has(n, rules.titles));
+  const times = places.filter((n) => new RegExp(rules.like).test(cells[n]) && has(n, rules.titles));
   const told = columns.findIndex((column) => column?.isTime);
   const time =
     told >= 0
@@ -374,12 +374,14 @@ function timesOfDay(rows, time, date, rules) {
   const parts = rows.flatMap((cells, row) => {
     const text = cells[time] ?? "";
     const found = clockPattern(rules).exec(text);
-    if (!found) return [];
+    const beside = dateIn(text, rules);
+    if (!found || (beside && Number.isNaN(dayOf(beside, rules)))) return [];
     const [minutes, whole] = found[2].slice(1).split(":").map(Number);
     const decimals = found[3] ? Number(`0.${found[3].slice(1)}`) : 0;
-    const day = dayOf(dateIn(text, rules) || dateIn(cells[date] ?? "", rules), rules);
+    const day = dayOf(beside || dateIn(cells[date] ?? "", rules), rules);
     return [{ row, clock: 3600 * Number(found[1]) + 60 * minutes + whole + decimals, day }];
   });
+  if (parts.length === 0) throw new Unreadable(`its times are in another form; ${rules.how}`);
   const isOfDay = parts.every(({ clock }) => clock < DAY);
   let turns = 0;
   const goesOn = parts.map(({ clock }, n) => {
@@ -390,7 +392,7 @@ function timesOfDay(rows, time, date, rules) {
   const isApart = parts.some(
     ({ day, clock }, n) => n > 0 && day === parts[n - 1].day && clock - parts[n - 1].clock < -DAY / 2,
   );
-  const first = parts[0]?.day || 0;
+  const first = parts[0].day || 0;
   const times = rows.map(() => Number.NaN);
   for (const [n, { row, clock, day }] of parts.entries()) {
     times[row] = isDated && !isApart ? DAY * day + clock : DAY * first + goesOn[n];

@@ -20,8 +20,6 @@ BAG_SUFFIXES = (".bag", ".db3", ".mcap", ".zstd")
 """The suffixes of a bag of ROS 1 and of the files in a bag of ROS 2, which it may compress: dive.db3.zstd."""
 LOG_SUFFIXES = (*MAVLINK_SUFFIXES, ULOG_SUFFIX, *BAG_SUFFIXES)
 """The suffixes of logs that are no tables."""
-IDENTIFIED = "rov-fmu identify"
-"""The profile of an MCAP file with logs as they were identified, by which it is no log of its own."""
 TABLE_SUFFIXES = (".csv", ".mat")
 """The suffixes of tables: CSV files, and variables of MATLAB."""
 _OWN = {".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL, ".ssp": SYSTEM}

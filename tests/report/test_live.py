@@ -464,6 +464,10 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
 
 
 BAD = {
+    "times of 12 hours": (
+        b"Time,u_t [%],depth [m]\n12:59:58 PM,1,1\n12:59:59 PM,2,1\n01:00:00 PM,3,1\n",
+        "its times are in another form; write seconds, a time of day such as 10:08:02.5, or 2026-05-01T10:08:02.5",
+    ),
     "empty": (b"", "less than two rows"),
     "other columns": (b"a,b\n1,2\n3,4\n", "no column \N{LEFT DOUBLE QUOTATION MARK}time"),
     "no command": (

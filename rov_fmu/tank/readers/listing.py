@@ -12,7 +12,7 @@ from itertools import groupby
 from pathlib import Path
 
 from rov_fmu.io.csv_table import EMPTY, CsvFile, DataFileError
-from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
+from rov_fmu.io.file_kinds import LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.readers.other_files import PICTURE
@@ -104,12 +104,7 @@ def _needs_no_word(path: Path) -> bool:
     """Return True for a hidden file, a file of the system, and one that this program has written or reads by name."""
     if path.name.startswith(".") or path.name in _OF_SYSTEM or path.suffix.lower() in OWN_SUFFIXES:
         return True
-    if any(path.name.endswith(end) and path.with_name(path.name[: -len(end)]).is_file() for end in _OF_DATABASE):
-        return True
-    if path.suffix.lower() == ".mcap" and path.is_file():
-        with suppress(OSError), path.open("rb") as file:
-            return IDENTIFIED.encode() in file.read(64)
-    return False
+    return any(path.name.endswith(end) and path.with_name(path.name[: -len(end)]).is_file() for end in _OF_DATABASE)
 
 
 def _has_tests(folder: Path) -> bool:

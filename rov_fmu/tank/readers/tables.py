@@ -242,7 +242,7 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     if not told.any():
         what = "both a time and a command" if commanding else "a time"
         for name in (name for name in ("time", *commanding) if table.unread[name]):
-            kind, how = ("time", f". Otherwise, {HOW}") if name == "time" else ("number", "")
+            kind, how = ("time", f"; {HOW}") if name == "time" else ("number", "")
             reason = f"is no {kind}, and no row has {what}{how}"
             raise table.error(table.unread[name][0], name, reason)
         raise DataFileError(f"{table.path}: no row has {what}")

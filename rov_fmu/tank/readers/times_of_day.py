@@ -31,6 +31,8 @@ HOW = "write seconds, a time of day such as 10:08:02.5, or 2026-05-01T10:08:02.5
 _DAY = 86400.0
 _EPOCH = datetime(1970, 1, 1).toordinal()
 _FIND = re.compile(CLOCK, re.IGNORECASE)
+LIKE = r"[0-9]:[0-5][0-9]"
+"""What a time of day contains in any form. A column of it is that of the time, also where its form is refused."""
 _TITLES = ("time", "timestamp", "t", "date")
 
 
@@ -38,8 +40,10 @@ def time_rules_of_page() -> dict[str, Any]:
     """Return the rules by which recording.js, of the page that flies, reads times of day."""
     return {
         "pattern": CLOCK,
+        "like": LIKE,
         "between": BETWEEN,
         "days": DAYS,
+        "how": HOW,
         "firstRows": FIRST_ROWS,
         "titles": [*_TITLES, *words_for("time"), *words_for("date")],
         "dates": ["date", *words_for("date")],
@@ -56,7 +60,7 @@ def time_columns(rows: Sequence[Sequence[str]], renamed: Mapping[str, str]) -> d
     words = {title: meanings(words_in(title)) for title in titles}
     below, found = dict(zip(titles, cells, strict=True)), dict[str, str]()
     if not any(map(KnownColumns({"time": TIME}).has, titles)):
-        times = (own for own in words if {*_TITLES} & {*words[own]} and _FIND.search(below[own]))
+        times = (own for own in words if {*_TITLES} & {*words[own]} and re.search(LIKE, below[own]))
         found |= dict.fromkeys(sorted(times, key=lambda own: words[own] != ["time"])[:1], "time [s]")
     if not any(map(KnownColumns({"date": DATE}).has, titles)):
         dates = [
@@ -69,17 +73,19 @@ def time_columns(rows: Sequence[Sequence[str]], renamed: Mapping[str, str]) -> d
 def times_of_day(table: Columns) -> Array | None:
     """Return the times of a table whose column `time` has times of day, s; None for another one.
 
-    They count since 1970, or, where no date is told, since the first midnight. NaN stands for a cell that is none.
+    They count since 1970, or, where no date is told, since the first midnight. NaN stands for a cell that is none, and
+    for one with more than a date beside the time: 1:00:00 PM is not at 1 o'clock.
     """
     if 2 * len(table.unread["time"]) <= np.count_nonzero(np.isfinite(table.values["time"])):
         return None
     clock, days = np.full((2, len(table.lines)), nan)
     for row, cells in enumerate(table.rows()):
-        if match := _FIND.search(cells["time"]):
+        match, beside = _FIND.search(cells["time"]), _rest(cells["time"])
+        if match and (not beside or isfinite(_day(beside))):
             minutes, seconds = map(float, match[2].split(":")[1:])
             decimals = float(f"0.{match[3][1:]}") if match[3] else 0.0
             clock[row] = 3600.0 * float(match[1]) + 60.0 * minutes + seconds + decimals
-            days[row] = _day(_rest(cells["time"]) or _rest(cells.get("date", "")))
+            days[row] = _day(beside or _rest(cells.get("date", "")))
     there = np.isfinite(clock)
     if not there.any():
         return None

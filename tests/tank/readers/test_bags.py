@@ -1,7 +1,10 @@
 """Bags of ROS 1 and ROS 2, which the tests write with rosbags."""
 
+import bz2
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from struct import pack
 from typing import Any
 
 import numpy as np
@@ -19,6 +22,8 @@ from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers.listing import list_files
+from rov_fmu.tank.readers.recordings import Damage, Stream, bag_messages
+from tests.commands import ROOT
 from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
@@ -251,3 +256,36 @@ def test_depth_and_heading_of_mavros_and_velocities_of_a_dvl(tmp_path: Path) -> 
         assert measured(log, "heading") == pytest.approx(motion.HEADING)
         for axis, values in zip(("surge", "sway", "heave"), DIVE.velocity.T, strict=True):
             assert measured(log, f"{axis} velocity") == pytest.approx(values[known])
+
+
+def _fields(**fields: bytes) -> bytes:
+    named = [f"{name}=".encode() + value for name, value in fields.items()]
+    return b"".join(pack("<I", len(field)) + field for field in named)
+
+
+def _record(data: bytes, **fields: bytes) -> bytes:
+    """Return a record of a bag of ROS 1, as its format 2.0 describes it: a header of fields, and data."""
+    header = _fields(**fields)
+    return pack("<I", len(header)) + header + pack("<I", len(data)) + data
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2"])
+def test_a_bag_without_an_index_is_read_by_what_is_inside_rosbags(compression: str, tmp_path: Path) -> None:
+    """The bytes are written here. A new rosbags may change what is inside it, so that only tried versions are taken."""
+    definition = _fields(type=b"std_msgs/Float64", message_definition=b"float64 data\n")
+    own = _record(definition, op=b"\x07", conn=pack("<I", 3), topic=b"/depth")
+    for n in range(3):
+        at = pack("<II", 100 + n, 500_000_000)
+        own += _record(pack("<d", 0.5 * n), op=b"\x02", conn=pack("<I", 3), time=at)
+    packed = bz2.compress(own) if compression == "bz2" else own
+    chunk = _record(packed, op=b"\x05", compression=compression.encode(), size=pack("<I", len(own)))
+    head = _record(b" " * 9, op=b"\x03", index_pos=pack("<Q", 0), conn_count=pack("<I", 0), chunk_count=pack("<I", 0))
+    path, damage = tmp_path / "dive.bag", Damage()
+    path.write_bytes(b"#ROSBAG V2.0\n" + head + chunk)
+    messages = [*bag_messages(path, damage)]
+    assert damage.is_cut, "its header tells of no index"
+    stream = Stream("/depth", "std_msgs/Float64", "ros1", "ros1msg", b"float64 data\n")
+    expected = [(stream, (100 + n) * 10**9 + 500_000_000, pack("<d", 0.5 * n)) for n in range(3)]
+    assert messages == expected
+    (asked,) = re.findall(r'"rosbags(>=[^"]+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert re.fullmatch(r">=0\.11\.7,<0\.12", asked), "try what is inside the next version before it is allowed"

@@ -85,21 +85,28 @@ def test_a_date_that_is_that_of_the_start_or_of_another_zone_does_not_count_twic
     assert times(tmp_path, "date;time [s]", rows) == pytest.approx(SINCE_1970, abs=1e-5)
 
 
-UNTOLD = {
-    "a word": (
-        [f"late{n}" for n in range(10)],
-        "is no time, and no row has both a time and a command. Otherwise, write seconds, a time of day such as "
-        "10:08:02.5, or 2026-05-01T10:08:02.5",
-    ),
+ODD: dict[str, Callable[[datetime], str]] = {
+    "AM or PM": lambda at: f"{at:%I:%M}:{hundredths(at)} {at:%p}",
+    "hours and minutes": lambda at: f"{at:%H:%M}",
+    "minutes and seconds": lambda at: f"{at:%M}:{hundredths(at)}",
+    "the month first": lambda at: f"{at:%m/%d/%Y %H:%M}:{hundredths(at)}",
+    "a year of two digits": lambda at: f"{at:%d.%m.%y %H:%M}:{hundredths(at)}",
+    "the month in letters": lambda at: f"{at:%d %b %Y %H:%M}:{hundredths(at)}",
+    "a date with AM or PM": lambda at: f"{at:%Y-%m-%d %I:%M}:{hundredths(at)} {at:%p}",
+    "another zone": lambda at: f"{at:%H:%M}:{hundredths(at)} CET",
+    "a word": lambda at: f"late at {at:%S}",
 }
 
 
-@pytest.mark.parametrize("name", UNTOLD)
-def test_a_time_that_is_not_told_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
-    rows, reason = UNTOLD[name]
-    with pytest.raises(DataFileError) as error:
-        times(tmp_path, "time [s]", rows)
-    assert str(error.value) == f"{tmp_path / 'dive.csv'}, line 2, column 'time [s]' = {rows[0]}: {reason}"
+@pytest.mark.parametrize("form", ODD)
+def test_a_time_in_another_form_is_refused_in_one_line_that_says_what_to_write(form: str, tmp_path: Path) -> None:
+    rows = [ODD[form](at) for at in AT]
+    for title in ("time [s]", *(["Time"] if form != "a word" else [])):
+        with pytest.raises(DataFileError) as error:
+            times(tmp_path, title, rows)
+        reason = "is no time, and no row has both a time and a command; write seconds, a time of day such as 10:08:02.5"
+        place = f"{tmp_path / 'dive.csv'}, line 2, column 'time [s]' = {rows[0]}"
+        assert f"{error.value}" == f"{place}: {reason}, or 2026-05-01T10:08:02.5"
 
 
 def test_cells_that_are_damaged_have_no_time(tmp_path: Path) -> None:
