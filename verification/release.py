@@ -49,7 +49,7 @@ def distributions(folder: Path) -> None:
 
 
 def fmus(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str | None = None) -> None:
-    """Build the FMUs of vehicles that ship: FMI 2.0 with its OSP description, FMI 3.0, and the VideoRay's in Python."""
+    """Build the FMUs of vehicles that ship: FMI 2.0 and 3.0, and the VideoRay's in Python."""
     for name in vehicles:
         vehicle = load_vehicle(SHIPPED[name])
         build_fmu(vehicle, folder / f"{name}.fmu", platforms=platforms)

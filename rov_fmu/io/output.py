@@ -177,7 +177,7 @@ def _errors_about(path: Path) -> Iterator[None]:
 # ---- Whose file it is ------------------------------------------------------------------------------------------------
 #
 # A file may be replaced if this program wrote it and nobody has changed it since. It proves this itself, by a digest in
-# its first line, or as an FMU does by the digests of its parts. Any other file, such as a table or a picture, is in the
+# its first line, or as an archive does by one in its comment. Any other file, such as a table or a picture, is in the
 # list of what this program wrote on this machine. All others are replaced with `force` alone.
 
 _WRITTEN = "written"
