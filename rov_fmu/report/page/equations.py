@@ -72,12 +72,12 @@ class Line:
     def rows(self) -> Iterator[tuple[str, str, str]]:
         """Yield a row for each term: the left side, which only the first has, the term with its sign, and its words."""
         for n, (words, term) in enumerate(self.terms):
-            text = shown(term)
+            text = written_out(term)
             sign = "=" if n == 0 else "" if text.startswith("−") else "+"
-            yield "" if n else shown(self.left), f"{sign} {text}" if sign else text.replace("−", "− ", 1), words
+            yield "" if n else written_out(self.left), f"{sign} {text}" if sign else text.replace("−", "− ", 1), words
 
 
-def shown(x: Expression) -> str:
+def written_out(x: Expression) -> str:
     """Write a formula as text. A quantity of the equation has a letter; a steady force or speed has a star."""
 
     def name_of(name: Name) -> str:
