@@ -212,13 +212,15 @@ def _as_written(x: Expression) -> Expression:  # noqa: PLR0911 - a case for each
         case Operation("/", (Number(1.0), Operation("/", (below, above)))):
             return _as_written(above) / _as_written(below)
         case Operation("+" | "-" | "/" as op, (left, right)):
-            return {"+": add, "-": sub, "/": truediv}[op](_as_written(left), _as_written(right))
+            operated: Expression = _OPERATORS[op](_as_written(left), _as_written(right))
+            return operated
         case Operation(op, args):
             return Operation(op, tuple(map(_as_written, args)))
     return x
 
 
 _MINUS = of(-1.0)
+_OPERATORS = {"+": add, "-": sub, "/": truediv}
 
 
 def _factors(x: Expression) -> Iterator[Expression]:
