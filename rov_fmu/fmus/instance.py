@@ -11,6 +11,7 @@ from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from rov_fmu.io.messages import RovError, brief, reason_of
 Array = npt.NDArray[np.float64]
 WARNING = 1
 """The status `warning` in every version of FMI; more serious ones are greater."""
+_ROUNDING = 1e-6
+"""By what share of its length a step may pass the end of a run by rounding."""
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 """The name of each status, in every version of FMI."""
 _MESSAGE = [""]
@@ -95,8 +98,11 @@ class Instance:
         self.fmu: Any = None
         self.renew(logging=logging)
         self._kept, self.time = cache(self.tables), 0.0
+        self._stop = inf
         self.do_step: Callable[[float, float], int] = self._stepping()
-        """Takes a step from a time over a length, s, and returns the status. Raises CallError if the run ends."""
+        """Takes a step from a time over a length, s, and returns the status. Raises CallError if the run ends.
+
+        Where rounding would carry it past the end of the run, which FMI forbids, it ends there."""
 
     def renew(self, *, logging: bool = False) -> None:
         """Make a new instance in place of one that was freed. Tables remain valid. Raises LoadError.
@@ -201,7 +207,7 @@ class Instance:
 
         FMI 2.0 has the times before the start values, and 3.0 as the initialization begins.
         """
-        self.time = start
+        self.time, self._stop = start, inf if stop is None else stop
         times = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
         if self._version == "3":
             return partial(self.fmu.enterInitializationMode, **times)
@@ -234,15 +240,20 @@ class Instance:
 
     def _stepping(self) -> Callable[[float, float], int]:
         number, pointer, fmu = ctypes.c_double, ctypes.c_void_p, self.fmu
+
+        def within(time: float, length: float) -> float:
+            last = self._stop - time
+            return last if last < length < last + _ROUNDING * length else length
+
         if self._version == "2":
             two = self._function("DoStep", number, number, ctypes.c_int)
-            return lambda time, length: two(fmu.component, time, length, True)
+            return lambda time, length: two(fmu.component, time, within(time, length), True)
         three = self._function("DoStep", number, number, ctypes.c_bool, *[pointer] * 4)
         flags, last = (ctypes.c_bool * 3)(), number()
         told = [ctypes.addressof(flags) + n for n in range(3)], ctypes.addressof(last)
 
         def step(time: float, length: float) -> int:
-            status: int = three(fmu.component, time, length, True, *told[0], told[1])
+            status: int = three(fmu.component, time, within(time, length), True, *told[0], told[1])
             if flags[1]:
                 raise CallError(f"the FMU ended the run at {last.value:.6g} s")
             return status

@@ -2,14 +2,20 @@
 
    y' = (a + 2 b + 3 c + gain u - y)/0.5; if fast is true, y is at once what it would become. mode: 1 fails at 1 s, 2 ends
    the process, 3 reads a null pointer, 4 does not return, 5 waits for a millisecond in each step, 6 refuses inputs and
-   7 tells nothing once y is positive, 8 cannot be initialized, 9 warns and goes on. The digit in the GUID selects what
-   fmi2Reset does: 0 resets, 1 does nothing and returns OK, 2 returns an error; with 3 there is no instance. */
+   7 tells nothing once y is positive, 8 cannot be initialized, 9 warns and goes on, 10 refuses a step that ends after
+   stopTime, as FMUs of 20-sim do, and one of another length that ends before, 11 does not return from fmi2Terminate,
+   12 closes the files of its process, 13 tells an infinite y. The digit in the GUID selects what fmi2Reset does: 0
+   resets, 1 does nothing and returns OK, 2 returns an error; with 3 there is no instance. */
 #ifdef _WIN32
+#include <io.h>
 #include <windows.h>
+#define CLOSE(file) _close(file)
 #define WAIT() Sleep(1)
 #else
 #define _POSIX_C_SOURCE 199309L
 #include <time.h>
+#include <unistd.h>
+#define CLOSE(file) close(file)
 #define WAIT() nanosleep(&(struct timespec){0, 1000000}, NULL)
 #endif
 
@@ -20,7 +26,7 @@
 #include "fmi2Functions.h"
 
 typedef struct {
-    double a, b, c, u, y;
+    double a, b, c, u, y, stop, length;
     int gain, mode, fast, reset;
     const fmi2CallbackFunctions *host;
 } Instance;
@@ -45,11 +51,15 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 }
 void fmi2FreeInstance(fmi2Component c) { free(c); }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean d, fmi2Real t, fmi2Real s, fmi2Boolean e, fmi2Real f) {
+    ((Instance *)c)->stop = f;
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return ((Instance *)c)->mode == 8 ? fmi2Error : fmi2OK; }
-fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) {
+    while (((Instance *)c)->mode == 11) WAIT();
+    return fmi2OK;
+}
 fmi2Status fmi2Reset(fmi2Component c) {
     const int reset = ((const Instance *)c)->reset;
     if (reset == 0) begin(c);
@@ -93,13 +103,16 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     if (i->mode == 3) return *(volatile fmi2Status *)0;
     if (i->mode == 5) WAIT();
     while (i->mode == 4) WAIT();
+    if (t == 0.0) i->length = h;
+    if (i->mode == 10 && (t + h > i->stop || (t + h < i->stop && h != i->length))) return fmi2Error;
+    for (int file = 3; i->mode == 12 && file < 64; file++) CLOSE(file);
     if (i->mode == 1 && t >= 1.0 - 1e-9) {
         i->host->logger(NULL, "foreign", fmi2Warning, "warning", "the pump is blocked");
         i->host->logger(NULL, "foreign", fmi2OK, "info", "goodbye");
         return fmi2Error;
     }
     const double to = i->a + 2.0 * i->b + 3.0 * i->c + i->gain * i->u;
-    i->y = i->fast ? to : to + (i->y - to) * exp(-h / 0.5);
+    i->y = i->mode == 13 ? INFINITY : i->fast ? to : to + (i->y - to) * exp(-h / 0.5);
     return i->mode == 9 ? fmi2Warning : fmi2OK;
 }
 
