@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from types import MappingProxyType
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive, is_unchanged
 from rov_fmu.fmu.content import FmuContent, native_content, python_content, web_module
 from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.fmu.variables import FmuModel
 from rov_fmu.fmus.fmu import Fmu
 from rov_fmu.fmus.instance import RunError
 from rov_fmu.io.file_kinds import FMU
@@ -135,6 +137,21 @@ def with_binaries(content: FmuContent, binaries: Mapping[str, bytes], fmi: int) 
         for platform, library in binaries.items()
     }
     return {**content.files, **libraries}
+
+
+def model_fmu(
+    model: FmuModel,
+    platforms: Sequence[str] | None = None,
+    pages: Mapping[str, bytes] = MappingProxyType({}),
+    fmi: int = 2,
+) -> bytes:
+    """Return the FMU of a model for Co-Simulation, with further files by their paths. Raises BuildError.
+
+    - `platforms`: those of PLATFORMS, or `host`; by default those with 64 bits.
+    """
+    chosen = chosen_platforms(platforms, fmi)
+    content = native_content(model, pages, fmi, "cs", chosen)
+    return archive(with_binaries(content, compile_all(chosen, content.sources, content.identifier, fmi=fmi), fmi))
 
 
 def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> FmuContent:

@@ -247,15 +247,6 @@ def _engines_quickly() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _fmus_of_systems(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep the FMUs of systems in a folder of this run: some have no binary or no page, which users would then get."""
-    folder = tmp_path_factory.mktemp("cache")
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("rov_fmu.bridges.system.system.user_cache_path", lambda *_, **__: folder)
-        yield
-
-
 @contextmanager
 def without_page() -> Iterator[None]:
     """Let builds in this process leave out the FMU's page, which takes most of their time."""

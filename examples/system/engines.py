@@ -101,7 +101,7 @@ def fmpy(folder: Path, parameters: str) -> Trajectory:
     path = str(system_file(folder, parameters))
     together = ParameterSet(name=parameters)
     for component in read_ssd(path).system.elements:
-        for p in component.parameterBindings[0].parameterValues[0].parameters:
+        for p in (one for binding in component.parameterBindings for one in binding.parameterValues[0].parameters):
             together.parameters.append(Parameter(name=f"{component.name}.{p.name}", type=p.type, value=p.value))
     result = simulate_ssp(path, stop_time=STOP, step_size=STEP, parameter_set=together)
     return {f"{c}.{name}": np.array(result[f"{c}.{name}"][:STEPS]) for c, name in NAMES}

@@ -27,8 +27,9 @@ def fly(ssp: str, step: float, steps: int) -> Iterator[dict[str, float]]:
                     [v.valueReference], [kind(x)]
                 )
             fmu.setupExperiment(startTime=0.0)
-            for parameter in component.parameterBindings[0].parameterValues[0].parameters:
-                put[component.name, parameter.name](parameter.value)
+            for binding in component.parameterBindings:
+                for parameter in binding.parameterValues[0].parameters:
+                    put[component.name, parameter.name](parameter.value)
             fmu.enterInitializationMode()
             fmu.exitInitializationMode()
             advance.append(fmu.doStep)

@@ -66,8 +66,7 @@ def native_content(
     if isinstance(subject, FmuModel):
         model = subject
     else:
-        model = replace(model_of(subject), c_files=motion_sources(subject.layout))
-        own_files = _own_files(subject, pages)
+        model, own_files = motion_model(subject), _own_files(subject, pages)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     names = [path.name for path in sorted(C_SOURCES.iterdir())]
     own = [name for name in names if name.startswith(("fmi", "fmu", "instance", "saved"))]
@@ -85,6 +84,11 @@ def native_content(
         files["documentation/externalDependencies.txt"] = _external_dependencies(platforms).encode()
     documents = _common_files(model, describe(guid=guid)) | own_files
     return FmuContent(model.identifier, guid, documents | files, sources)
+
+
+def motion_model(vehicle: Vehicle) -> FmuModel:
+    """Return the model of a vehicle with its C files."""
+    return replace(model_of(vehicle), c_files=motion_sources(vehicle.layout))
 
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> FmuContent:

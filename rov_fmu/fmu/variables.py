@@ -194,6 +194,13 @@ class FmuModel:
     """Those of `Layout.voltage_ranges`."""
     has_only_water: bool = False
     """True for a vehicle without a surface, so that it must not rise above depth 0."""
+    experiment: tuple[float, float] = (10.0, 0.01)
+    """The stop time and the step of the default experiment, s."""
+
+    def begun(self, start: Mapping[str, Any], stop: float, step: float) -> "FmuModel":
+        """Return the model with other start values, for an experiment."""
+        made = tuple(replace(v, start=float(start[v.name])) if v.name in start else v for v in self.variables)
+        return replace(self, variables=made, experiment=(stop, step))
 
 
 def interface_header(model: FmuModel, token: str, fmi: int, interfaces: Collection[str]) -> str:

@@ -38,11 +38,11 @@ class Fmu(Described):
     """FMPy's."""
 
     @classmethod
-    def open(cls, path: Path, content: bytes | None = None, *, is_ours: bool = False) -> Self:
+    def open(cls, path: Path, content: bytes | None = None, *, is_ours: bool = False, **more: Any) -> Self:
         """Read an FMU: the file at a path, or its content, of which messages say the path. Raises FileError.
 
         `is_ours` is True for one that this process has just made, so that it needs no child process to read it, and may
-        be for Model Exchange alone.
+        be for Model Exchange alone. `more` is what a subclass has beside it.
         """
         content = read_bytes(path) if content is None else content
         with temporary_folder("fmu-") as folder:
@@ -52,7 +52,7 @@ class Fmu(Described):
             raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")
         if description.coSimulation is None and not is_ours:
             raise FileError(f"{path}: is not for Co-Simulation")
-        return cls(path, content, description)
+        return cls(path, content, description, **more)
 
     @cached_property
     def terminals(self) -> Mapping[str, Mapping[str, str]]:

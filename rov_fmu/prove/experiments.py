@@ -110,7 +110,8 @@ def read_experiments(fmu: Path, folder: Path, description: Any) -> list[Experime
     """
     manifest = _Member(fmu, folder, MANIFEST)
     if not Path(folder, MANIFEST).is_file():
-        raise NoResultsError(f"{manifest}: there is no such file: the FMU carries no reference results")
+        reason = "the FMU carries no reference results, as those that `rov-fmu system` makes for a plan"
+        raise NoResultsError(f"{manifest}: there is no such file: {reason}")
     reader = _Reader(description)
     experiments = list[Experiment]()
     for related in manifest.xml("fmiReferences").iterfind("{*}Related"):

@@ -17,7 +17,6 @@ from examples.system.engines import ENGINES, NAMES, Trajectory
 from examples.system.system import (
     CONNECTIONS,
     DEFAULT,
-    FMUS,
     build_system,
     parameter_sets,
     system_file,
@@ -30,7 +29,7 @@ from rov_fmu.bridges.system.run import recorded_names
 from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.bridges.system.fmus import undescribed_build
+from tests.bridges.system.fmus import described_model
 from tests.commands import ROOT, Capsys
 from tests.conftest import Made, without_page
 
@@ -113,9 +112,10 @@ def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None
     root = etree.fromstring(content["SystemStructure.ssd"])
     validate_tree(root, "SystemStructureDescription.xsd")
     sources = [one.get("source") for one in root.iter("{*}ParameterBinding")]
-    assert sources == [f"resources/{name}.ssv" for name in (e.name for e in system.elements)]
+    given = parameter_sets()[parameters]
+    assert sources == [f"resources/{e.name}.ssv" for e in system.elements if given[e.name]]
     sets = [etree.fromstring(content[source]) for source in sources]
-    assert [s.get("name") for s in sets] == [PARAMETER_SET] * len(FMUS), "Ecos takes those of one name"
+    assert [s.get("name") for s in sets] == [PARAMETER_SET] * len(sources), "Ecos takes those of one name"
     for values in sets:
         validate_tree(values, "SystemStructureParameterValues.xsd")
     (master,) = root.iter("{*}FixedStepMaster")  # for OMSimulator
@@ -152,7 +152,7 @@ PAGE = (ROOT / "docs" / "system.md").read_text(encoding="utf-8")
 
 def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every input that hangs on the world is connected."""
-    monkeypatch.setattr(system, "build_fmu", undescribed_build)
+    monkeypatch.setattr(system, "model_fmu", described_model)
     monkeypatch.setattr(system, "lack", lambda _: "")
     path = tmp_path / "tether.toml"
     (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
@@ -209,8 +209,7 @@ def tethered(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     pytest.importorskip("moordyn")
     folder = tmp_path_factory.mktemp("tethered")
     request.param(folder)
-    with without_page():
-        assert main(["system", str(folder / "plan.toml"), "-o", str(folder / "plan.ssp"), "--run"]) == 0
+    assert main(["system", str(folder / "plan.toml"), "-o", str(folder / "plan.ssp"), "--run"]) == 0
     return folder / "plan.ssp"
 
 
@@ -232,13 +231,7 @@ def test_engines_agree_on_tethers(engine: str, tethered: Path) -> None:
     if engine.startswith("Ecos"):
         found = engines.by_ecos(tethered, names, steps, 0.02)
     elif engine.startswith("libcosim"):
-        outputs = {
-            (c, name): v
-            for c, values in system.values.items()
-            for name, v in values.items()
-            if name in system.parts[c].names("output") and isinstance(v, float)
-        }
-        found = engines.by_libcosim(tethered, names, steps, starts=outputs)
+        found = engines.by_libcosim(tethered, names, steps)
     else:
         rows = list(fly(str(tethered), 0.02, steps))
         found = {name: np.array([row[name] for row in rows]) for name in map(".".join, names)}
@@ -265,7 +258,6 @@ def test_the_controller_of_the_page_holds_the_depth(tmp_path: Path, capsys: Caps
     FmuBuilder.build_FMU(tmp_path / "depth.py", dest=tmp_path)
     rov = '[component.rov]\nvehicle = "videoray"\n'
     (tmp_path / "plan.toml").write_text(f"step = 0.05\nstop_time = 60\n{plan}{rov}", encoding="utf-8")
-    with without_page():
-        assert main(["system", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "plan.ssp"), "--run"]) == 0
+    assert main(["system", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "plan.ssp"), "--run"]) == 0
     motion = np.genfromtxt(tmp_path / "plan.csv", delimiter=",", names=True, deletechars="")
     assert f"{motion['rov.z'][-1]:.2f} m" in text

@@ -11,13 +11,11 @@ from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
 from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
-from rov_fmu.build import chosen_platforms, with_binaries
-from rov_fmu.c.compile import compile_all
+from rov_fmu.build import model_fmu
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
 from rov_fmu.equation.layout import Layout
-from rov_fmu.fmu.archive import CARD, archive
-from rov_fmu.fmu.content import native_content
+from rov_fmu.fmu.archive import CARD
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
 from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
 from rov_fmu.io.templates import render
@@ -153,9 +151,5 @@ def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, 
 
     Raises BuildError.
     """
-    chosen = chosen_platforms(platforms, fmi)
     model = autopilot_model(autopilot)
-    card = {CARD: model.card.encode()}
-    content = native_content(model, card, fmi=fmi, interface="cs", platforms=chosen)
-    files = with_binaries(content, compile_all(chosen, content.sources, content.identifier, fmi=fmi), fmi)
-    return archive(files)
+    return model_fmu(model, platforms, {CARD: model.card.encode()}, fmi)

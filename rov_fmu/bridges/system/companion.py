@@ -58,6 +58,7 @@ def companion(name: str, **shape: Any) -> bytes:
     - `levels`: with how many levels it passes on or gets a profile of the water; 0 for the usual number.
     - `lines`: the number of points at which it moves each tether, by the tethers' names.
     - `waves`: True for a tether that a seaway moves.
+    - `start`, `experiment`: start values, and the stop time and the step of the default experiment, s.
     """
     slave = slave_of(name)
     sources = {

@@ -1,6 +1,6 @@
 """What a system must know about each of its FMUs: ports, units, start values, and what follows an input at once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -19,6 +19,8 @@ class SystemFmu(Fmu):
 
     ports: Mapping[str, Mapping[str, tuple[str, float]]] = field(default_factory=dict)
     """More terminals: for each the variable and the factor of each member."""
+    make: Callable[..., bytes] | None = None
+    """Makes the FMU from its `start` values and its default `experiment`, if it is made for the system."""
 
     @cached_property
     def terminals(self) -> Mapping[str, Mapping[str, str]]:
@@ -59,6 +61,15 @@ class SystemFmu(Fmu):
                 if name not in self.variables:
                     raise ValueError(f"{port}: {self.unknown(name)}")
         return replace(self, ports=ports)
+
+    def made_for(self, start: Mapping[str, Value], stop: float, step: float) -> "SystemFmu":
+        """Return the FMU with the start values of a system, and its end and step, s. Raises BuildError.
+
+        So the system is the same in importers that do not read the start values beside an FMU.
+        """
+        assert self.make
+        content = self.make(start=start, experiment=(stop, step))
+        return replace(SystemFmu.open(self.path, content, is_ours=True), ports=self.ports)
 
     def unknown(self, name: str) -> str:
         """Return the message about a name that the FMU does not have."""

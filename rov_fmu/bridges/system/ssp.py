@@ -61,7 +61,8 @@ def ssp_content(system: System) -> bytes:
     files = {_STRUCTURE: _rendered("SystemStructure.ssd.j2", system=system).encode()}
     for name, component in system.components.items():
         files[f"resources/{component.fmu}"] = component.content
-        files[f"resources/{name}.ssv"] = parameter_set(component).encode()
+        if component.values:
+            files[f"resources/{name}.ssv"] = parameter_set(component).encode()
     return archive(files)
 
 

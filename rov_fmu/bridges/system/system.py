@@ -1,19 +1,13 @@
-"""A system from its plan: everything that does not fit is told, and then the FMUs of vehicles are built."""
+"""A system from its plan: everything that does not fit is told, and then its FMUs are made, with its start values."""
 
-import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from functools import cache
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path
-
-from rov_fmu import __version__
 from rov_fmu.autopilot.gains import autopilot_of
-from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
+from rov_fmu.bridges.autopilot.fmu import autopilot_model
 from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, slave_of, timed_rows
 from rov_fmu.bridges.system.companions._common import Companion
 from rov_fmu.bridges.system.connections import (
@@ -29,15 +23,13 @@ from rov_fmu.bridges.system.connections import (
 from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, System
-from rov_fmu.build import build_fmu
-from rov_fmu.c.compile import compiler_identity, host_platform
+from rov_fmu.build import model_fmu
 from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
-from rov_fmu.fmu.content import native_content
+from rov_fmu.fmu.content import motion_model, native_content
+from rov_fmu.fmu.variables import FmuModel
 from rov_fmu.fmus.variable import Value
-from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, lines_on, listed, only
-from rov_fmu.io.output import kept
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line
@@ -45,7 +37,7 @@ from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 
 _MOST_TOLD = 8
-"""The most inputs of a component or a terminal that are told by their names."""
+"""The most variables or components of a sentence that are told by their names."""
 Served = dict[str, dict[str, str]]
 """The ends of the names of the places that a companion has, by whom it serves, for each companion."""
 _Line = tuple[str, str, float]
@@ -66,7 +58,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
     served, lines = _served(plan)
-    parts, vehicles = _parts(plan, path, served, on_part)
+    parts = _parts(plan, path, served)
     system = SystemStructure(parts, {}, [])
     wrong += _set_values(plan, path, system)
     wrong += _connect(plan, lines, system)
@@ -79,23 +71,24 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
     _pass_on(system)
-    for name, vehicle in vehicles.items():
-        on_part(f"{name}, the FMU of {vehicle.name}")
-        described = parts[name]
-        built = replace(described, content=_built(vehicle))
-        parts |= {other: built for other, part in parts.items() if part is described}
-        _check_size(parts, name, path)
+    ready: dict[tuple[int, str], SystemFmu] = {}
+    for name, part in [*parts.items()]:
+        if part.make:
+            alike = id(part), repr(system.values[name])
+            if alike not in ready:
+                on_part(name)
+                ready[alike] = part.made_for(system.values[name], plan.stop_time, plan.step)
+            parts[name], system.values[name] = ready[alike], {}
+            _check_size(parts, name, path)
     return system
 
 
-def _parts(
-    plan: SystemPlan, path: Path, served: Served, on_part: Callable[[str], object]
-) -> tuple[dict[str, SystemFmu], dict[str, Vehicle]]:
-    """Return the FMUs of a plan, and the vehicles whose FMUs are only described, by the first component of each.
+def _parts(plan: SystemPlan, path: Path, served: Served) -> dict[str, SystemFmu]:
+    """Return the FMUs of a plan; those that are made for it do not have its start values yet, and may not run.
 
     Components of one kind have one FMU. Raises SystemPlanError with every reason, and FileError about a vehicle.
     """
-    parts, vehicles, unread = dict[str, SystemFmu](), dict[str, Vehicle](), list[str]()
+    parts, unread = dict[str, SystemFmu](), list[str]()
     tables = _tables(plan, path, unread)
     levels = max(map(levels_of, tables.values()), default=0)
     ready: dict[str, SystemFmu] = {}
@@ -105,36 +98,36 @@ def _parts(
         own = table.model_dump_json(include={*SOURCES, "file", "point", "port", "held"})
         kind = f"{own}{others}{is_in_waves}"
         try:
-            if kind in ready:
-                part = ready[kind]
-            elif table.vehicle:
-                vehicles[name] = _vehicle(name, table, path)
-                part = _description(vehicles[name]).with_ports(table.port)
-            elif table.held:
-                on_part(name)
-                part = _autopilot(name, plan, path)
-            else:
-                on_part(name)
-                lines = {other: nodes for other in others if (nodes := _slave(plan, other).nodes)}
-                shape = {
-                    "rows": tables.get(name),
-                    "places": [other for other, suffix in others.items() if suffix and other not in lines],
-                    "levels": levels,
-                    "lines": lines,
-                    "waves": is_in_waves,
-                }
-                part = _part(table, path, **shape).with_ports(table.port)
+            if kind not in ready:
+                if table.fmu:
+                    part = SystemFmu.open(inside(path.parent, table.fmu))
+                elif table.companion and not table.held:
+                    lines = {other: nodes for other in others if (nodes := _slave(plan, other).nodes)}
+                    make = partial(
+                        companion,
+                        table.companion,
+                        rows=tables.get(name),
+                        places=[other for other, suffix in others.items() if suffix and other not in lines],
+                        levels=levels,
+                        lines=lines,
+                        waves=is_in_waves,
+                    )
+                    part = SystemFmu.open(Path(table.companion), make(), is_ours=True, make=make)
+                else:
+                    held = _autopilot(name, plan, path) if table.held else None
+                    part = _described(held or motion_model(_vehicle(name, table, path)))
+                ready[kind] = part.with_ports(table.port)
         except FileError as error:
             where = f"{path}: component.{name}.fmu: " if table.fmu else ""
             unread += [f"{where}{line}" for line in str(error).split("\n")]
         except ValueError as error:
             unread += lines_on(path, [f"component.{name}.port.{error}"])
         else:
-            parts[name] = ready[kind] = part
+            parts[name] = ready[kind]
             _check_size(parts, name, path)
     if unread:
         raise SystemPlanError(*unread)
-    return parts, vehicles
+    return parts
 
 
 def _check_size(parts: Mapping[str, SystemFmu], name: str, path: Path) -> None:
@@ -143,13 +136,14 @@ def _check_size(parts: Mapping[str, SystemFmu], name: str, path: Path) -> None:
         raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
 
 
-def _part(table: ComponentTable, path: Path, **shape: Any) -> SystemFmu:
-    """Make a companion of a shape, or read an FMU. Raises FileError."""
-    if table.fmu:
-        file = inside(path.parent, table.fmu)
-        return SystemFmu.open(file)
-    assert table.companion
-    return SystemFmu.open(Path(table.companion), companion(table.companion, **shape), is_ours=True)
+def _described(model: FmuModel) -> SystemFmu:
+    """Return what the FMU of a model will have, before the compilation takes its time."""
+
+    def make(start: Mapping[str, Value], experiment: tuple[float, float]) -> bytes:
+        return model_fmu(model.begun(start, *experiment), ["host"])
+
+    content = archive(native_content(model, interface="cs").files)
+    return SystemFmu.open(Path(f"{model.identifier}.fmu"), content, is_ours=True, make=make)
 
 
 def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
@@ -204,8 +198,8 @@ def _slave(plan: SystemPlan, component: str) -> type[Companion]:
     return slave_of(table.companion) if table and table.companion else Companion
 
 
-def _autopilot(name: str, plan: SystemPlan, path: Path) -> SystemFmu:
-    """Make the autopilot of a component's vehicle, for the step of the plan. Raises FileError."""
+def _autopilot(name: str, plan: SystemPlan, path: Path) -> FmuModel:
+    """Return the model of the autopilot of a component's vehicle, for the step of the plan. Raises FileError."""
     held = plan.component[name].held or ""
     table = plan.component.get(held)
     if not table or not table.vehicle:
@@ -213,10 +207,9 @@ def _autopilot(name: str, plan: SystemPlan, path: Path) -> SystemFmu:
         reason = f"must be a component that has a vehicle{only(held, has)}"
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', reason, held)}")
     try:
-        made = autopilot_of(_vehicle(held, table, path), plan.step)
+        return autopilot_model(autopilot_of(_vehicle(held, table, path), plan.step))
     except InputError as error:
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', str(error), held)}") from error
-    return SystemFmu.open(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
 
 
 def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
@@ -228,33 +221,6 @@ def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
         for point, position in table.point.items()
     )
     return read_vehicle(file, read_bytes(file, VehicleFileError, most=LARGEST) + points.encode())
-
-
-def _description(vehicle: Vehicle) -> SystemFmu:
-    """Return what the FMU of a vehicle will have, before the compilation takes its time. It cannot run yet."""
-    content = archive(native_content(vehicle, interface="cs").files)
-    return SystemFmu.open(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
-
-
-def _built(vehicle: Vehicle) -> bytes:
-    """Return the FMU of a vehicle for this machine: from the user's cache folder, or built now. Raises BuildError.
-
-    It is kept by all that it depends on: its interface and code (GUID), the texts of its file, and the compiler.
-    """
-    guid, text = native_content(vehicle, interface="cs").guid, vehicle.file_content or b""
-    parts = [guid, text.hex(), __version__, host_platform(), compiler_identity()]
-    folder = user_cache_path("rov-fmu", appauthor=False) / "fmu"
-
-    @cache
-    def make() -> bytes:
-        with temporary_folder("system-") as own:
-            path = Path(own, f"{vehicle.identifier}.fmu")
-            return build_fmu(vehicle, path, platforms="host", interface="cs").path.read_bytes()
-
-    try:
-        return kept(folder, hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32], make).read_bytes()
-    except OSError:  # the folder cannot be used
-        return make()
 
 
 def _set_values(plan: SystemPlan, path: Path, system: SystemStructure) -> Iterator[str]:
@@ -380,14 +346,27 @@ def unconnected(plan: SystemPlan, structure: SystemStructure) -> Iterator[str]:
             if own and own <= {*free} and (len(own) > _MOST_TOLD or not own.issuperset(members.values())):
                 yield f"{component}: the port {terminal} is not connected, so its inputs keep their start values"
                 free = [name for name in free if name not in own]
-            if structure.values[component].get(DIFFERENCE.format(terminal)):
+            if (flag := part.variables.get(DIFFERENCE.format(terminal))) and flag.start:
                 velocities = {members[name] for name in VELOCITIES.values()}
                 yield f"{component}: the velocity of {terminal} is the change of its place, because it is not connected"
                 free = [name for name in free if name not in velocities]
         if free:
-            others = [f"{len(free) - _MOST_TOLD} others"] if len(free) > _MOST_TOLD + 1 else free[_MOST_TOLD:]
-            names = listed([*free[:_MOST_TOLD], *others])
-            yield f"{component}: nothing is connected to {names}, which keep their start values"
+            yield f"{component}: nothing is connected to {_listed(free)}, which keep their start values"
+
+
+def elsewhere(structure: SystemStructure) -> Iterator[str]:
+    """Yield a sentence about the start values, and one about the factors, that some importers of an SSP do not read."""
+    tools = "FMPy's simulate_ssp and fmutool do not read"
+    if own := [name for name, values in structure.values.items() if values]:
+        yield f"{tools} the start values of {_listed(own)} in the SSP, nor libcosim those of outputs: set them there"
+    if ends := [".".join(one.end) for one in structure.connections if one.factor != 1.0]:
+        yield f"{tools} the factors of connections in the SSP, here to {_listed(ends)}: take another tool"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names in words, but not very many."""
+    others = [f"{len(names) - _MOST_TOLD} others"] if len(names) > _MOST_TOLD + 1 else names[_MOST_TOLD:]
+    return listed([*names[:_MOST_TOLD], *others])
 
 
 def files_of(plan: SystemPlan, structure: SystemStructure, name: str) -> System:

@@ -17,7 +17,7 @@ from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system, system_csv
 from rov_fmu.bridges.system.ssp import ssp_content
-from rov_fmu.bridges.system.system import files_of, made, unconnected
+from rov_fmu.bridges.system.system import elsewhere, files_of, made, unconnected
 from rov_fmu.fmu.archive import is_unchanged
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM
@@ -49,7 +49,7 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
     check_targets(targets, _inputs(plan, path), force=force, is_ours=is_ours)
     with parts() as shown:
         structure = made(plan, path, lambda name: shown.begin(f"making {name}"))
-        for sentence in unconnected(plan, structure):
+        for sentence in (*unconnected(plan, structure), *elsewhere(structure)):
             shown.print(sentence)
         outputs = [Output(output, ssp_content(files_of(plan, structure, output.stem)))]
         if runs:

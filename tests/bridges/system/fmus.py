@@ -1,13 +1,11 @@
 """FMUs for tests of systems: vehicles that are described but not compiled, and FMUs of a few lines of XML."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
+from rov_fmu.fmu.variables import FmuModel
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -16,10 +14,9 @@ def described(vehicle: Vehicle) -> bytes:
     return archive(native_content(vehicle, {}, 2, "cs", ["linux64"]).files)
 
 
-def undescribed_build(vehicle: Vehicle, path: Path, **_: Any) -> Any:
-    """Stand for `build`, which compiles."""
-    path.write_bytes(described(vehicle))
-    return SimpleNamespace(path=path)
+def described_model(model: FmuModel, _platforms: Sequence[str]) -> bytes:
+    """Stand for `model_fmu`, which compiles."""
+    return archive(native_content(model, interface="cs").files)
 
 
 @cache

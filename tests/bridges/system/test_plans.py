@@ -22,7 +22,7 @@ from rov_fmu.fmus.description import described as described_here
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
-from tests.bridges.system.fmus import described, foreign, undescribed_build
+from tests.bridges.system.fmus import described, described_model, foreign
 from tests.commands import ROOT, Capsys, without_progress
 from tests.often import spread
 from tests.vehicles import in_waves
@@ -67,7 +67,7 @@ def _companion(name: str, **shape: Any) -> bytes:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The current folder, with FMUs, where vehicles are described and not compiled."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(system, "build_fmu", undescribed_build)
+    monkeypatch.setattr(system, "model_fmu", described_model)
     # It takes most of the time to start a process that reads an FMU of others: tests of `prove` do.
     monkeypatch.setattr(fmu, "read_description", lambda _, folder: described_here(str(folder)))
     monkeypatch.setattr(system, "companion", _companion)
@@ -186,7 +186,7 @@ WRONG = {
 @pytest.mark.parametrize("case", spread(WRONG, [*WRONG][::2], WRONG))
 @pytest.mark.usefixtures("folder")
 def test_what_does_not_fit_is_one_line(case: str, capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(system, "build_fmu")  # nothing is compiled for a plan that does not fit
+    monkeypatch.delattr(system, "model_fmu")  # nothing is compiled for a plan that does not fit
     old, new, message = WRONG[case]
     assert old in PLAN
     # Of the two foreign FMUs, one is replaced, and is connected to the vehicle.
@@ -271,9 +271,9 @@ def test_a_field_and_ports_of_the_plan_are_handed_on() -> None:
     assert sources["rov", "V_N"].start == ("water", "V_N_rov")
     assert sources["one", "depth_41"].start == sources["two", "depth_41"].start == ("water", "depth_41")
     assert ("one", "depth_42") not in sources
-    assert found.values["water"]["seabed"] == 12.0
+    assert start_of(found, "water", "seabed") == 12.0
     assert sources["one", "z_top"] == (("crane", "y"), ("one", "z_top"), -0.3048)
-    assert found.values["one"] == {"seabed": 12.0, "difference_top": True}
+    assert [start_of(found, "one", name) for name in ("seabed", "difference_top")] == [12.0, 1.0]
     assert sources["deep", "z"] == (("cage", "V_N"), ("deep", "z"), 10.0)
     assert sources["cage", "z"] == (("deep", "V_N"), ("cage", "z"), 10.0), "a member is 0.1 of this variable"
     told = [*system.unconnected(plan, found)]
@@ -317,8 +317,8 @@ def test_a_sea_serves_vehicles_with_their_own_currents_and_every_node_of_a_tethe
     assert sources["water", "z"] == ("a", "z")
     assert sources["sea", "U_N_b"] == ("water", "V_N_b")
     assert sources["water", "z_b"] == ("b", "z")
-    assert found.values["water"] == {"z_b": 4.0, "seabed": 25.0}
-    assert found.values["sea"] == {"z_b": 4.0, "seabed": 25.0, "step": 0.1}
+    assert [start_of(found, "water", name) for name in ("z", "z_b", "seabed")] == [0.0, 4.0, 25.0]
+    assert [start_of(found, "sea", name) for name in ("z_b", "seabed", "step")] == [4.0, 25.0, 0.1]
     for n in (0, 20):
         assert sources["line", f"A_D_p{n}"] == ("sea", f"A_D_line_{n}")
         assert sources["sea", f"x_line_{n}"] == ("line", f"x_p{n}")
@@ -335,7 +335,8 @@ def test_a_sea_serves_vehicles_with_their_own_currents_and_every_node_of_a_tethe
 
 @pytest.mark.usefixtures("folder")
 def test_a_plan_becomes_a_system(capsys: Capsys) -> None:
-    Path("plan.toml").write_text(PLAN.replace(LAST, '["a.y", "b.u", 2.0],'), encoding="utf-8")
+    text = PLAN.replace(LAST, '["a.y", "b.u", 2.0],').replace("[component.b]", "start = { k = 4 }\n[component.b]")
+    Path("plan.toml").write_text(text, encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
     printed = capsys.readouterr()
     assert "Wrote my.ssp" in printed.out
@@ -346,8 +347,15 @@ def test_a_plan_becomes_a_system(capsys: Capsys) -> None:
     ends = {one.end: one.start for one in found.connections}
     assert {("rov", name) for name in into} <= ends.keys()
     assert {start[1] for start in ends.values() if start[0] == "rov"} == names.keys() - into | {"z"}
-    assert found.values["rov"] == {"z": 3.0}
-    assert found.values["water"] == {"z": 3.0}, "a connected input begins as its source"
+    assert start_of(found, "rov", "z") == 3.0
+    assert start_of(found, "water", "z") == 3.0, "a connected input begins as its source"
+    assert found.values == {"rov": {}, "tether": {}, "water": {}, "a": {"k": 4.0}, "b": {}}
+    (told,) = [line for line in printed.err.splitlines() if "start values of" in line]
+    assert told.endswith("do not read the start values of a in the SSP, nor libcosim those of outputs: set them there")
+    assert "do not read the factors of connections in the SSP, here to b.u: take another tool" in printed.err
+    for part in (found.parts["rov"], found.parts["tether"]):
+        experiment = part.description.defaultExperiment
+        assert (float(experiment.stopTime), float(experiment.stepSize)) == (1.0, 0.1)
     assert [one.factor for one in found.connections if one.end == ("b", "u")] == [2.0]
     # FMPy validates the structure and the parameter sets, and sets every input that is a connector.
     elements = read_ssd("my.ssp").system.elements
@@ -361,6 +369,11 @@ def test_a_plan_becomes_a_system(capsys: Capsys) -> None:
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 2
 
 
+def start_of(system: SystemStructure, component: str, name: str) -> float:
+    """Return the start value that the FMU of a component has by itself, for importers that read no other."""
+    return system.parts[component].variables[name].start
+
+
 def with_point() -> Vehicle:
     point = b'\n[[point]]\nname = "bow"\nposition = { value = [0.2, 0, -0.1], unit = "m", source = "drawing" }\n'
     return read_vehicle(VIDEORAY, VIDEORAY.read_bytes() + point)
@@ -372,12 +385,12 @@ def parts(**content: bytes) -> dict[str, SystemFmu]:
 
 @pytest.mark.usefixtures("folder")
 def test_components_of_one_kind_share_an_fmu() -> None:
-    text = PLAN.replace(
-        "[component.a]", "[component.copy]\nvehicle = 'videoray'\npoint.bow = [0.2, 0.0, -0.1]\n[component.a]"
-    )
+    alike = "[component.{}]\nvehicle = 'videoray'\npoint.bow = [0.2, 0.0, -0.1]\nstart.z = {}\n"
+    text = PLAN.replace("[component.a]", f"{alike.format('copy', 3)}{alike.format('deep', 4)}[component.a]")
     Path("plan.toml").write_text(text, encoding="utf-8")
     found = system.made(load_system_plan(Path("plan.toml")), Path("plan.toml")).parts
     assert found["copy"] is found["rov"]
+    assert found["deep"] is not found["rov"], "it begins elsewhere"
     assert found["a"] is found["b"]
 
 

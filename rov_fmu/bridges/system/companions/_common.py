@@ -47,12 +47,14 @@ class Companion(Fmi2Slave):  # type: ignore[misc]
         """Whom and what it serves: the arguments of `companion`, which its FMU has as a resource."""
 
     def register(self, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
-        """Take its variables, its author, and a default experiment with a step, s."""
+        """Take its variables with the start values of its shape, its author, and a default experiment."""
+        given, (stop, step) = self.shape.get("start", {}), self.shape.get("experiment", (60.0, step))
+        variables = {name: (kind, given.get(name, own), *about) for name, (kind, own, *about) in variables.items()}
         self.author, self.variables = "rov-fmu", variables
-        self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=step)
+        self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=stop, step_size=step)
         for name, (causality, start, _, text) in variables.items():
             setattr(self, name, start)
-            kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
+            kind, changes = (Boolean, "discrete") if isinstance(start, bool) else (Real, "continuous")
             how = Fmi2Variability[parameters if causality == "parameter" else changes]
             self.register_variable(kind(name, description=text, causality=Fmi2Causality[causality], variability=how))
 
