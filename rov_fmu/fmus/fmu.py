@@ -56,7 +56,10 @@ class Fmu(Described):
 
     @cached_property
     def terminals(self) -> Mapping[str, Mapping[str, str]]:
-        """The variables by the names of the members, for each terminal. Raises FileError."""
+        """The variables by the names of the members, for each terminal. Raises FileError.
+
+        A terminal with terminals or streams in it is left out, because a connection of its variables would be a half.
+        """
         where = f"{self.path}: {_TERMINALS}"
         with opened_archive(BytesIO(self.content), self.path) as zipped:
             if _TERMINALS not in zipped.namelist():
@@ -73,6 +76,7 @@ class Fmu(Described):
                 for member in terminal.findall("TerminalMemberVariable")
             }
             for terminal in root.findall("Terminals/Terminal")
+            if terminal.find("Terminal") is None and terminal.find("TerminalStreamMemberVariable") is None
         }
 
     def unpack(self, folder: Path) -> None:

@@ -94,12 +94,18 @@ def test_a_damaged_system_is_one_line(folder: Path) -> None:
 
 
 def rename(folder: Path, old: bytes, new: bytes) -> None:
-    """Give a component of the system another name."""
+    """Replace an attribute in the structure of the system, such as the name of a component."""
     with zipfile.ZipFile(folder / "my.ssp") as packed:
         files = {name: packed.read(name) for name in packed.namelist()}
     structure = "SystemStructure.ssd"
     files[structure] = files[structure].replace(b'"%s"' % old, b'"%s"' % new)
     (folder / "my.ssp").write_bytes(archive(files))
+
+
+def test_a_connection_may_have_an_offset(folder: Path) -> None:
+    rename(folder, b"2.0", b'2.0" offset="0.4')
+    runs = run_study(folder / "plan.toml", folder / "results", workers=1).runs
+    np.testing.assert_allclose(runs["second"], 1.0 - 0.1 - 0.5 * runs["a.speed"], rtol=1e-12)
 
 
 def test_the_name_of_a_component_leads_out_of_no_folder(folder: Path) -> None:
@@ -115,5 +121,5 @@ def test_the_name_of_a_component_leads_out_of_no_folder(folder: Path) -> None:
 @pytest.mark.parametrize("name", ["a.1", "", "b"])
 def test_a_component_whose_variables_have_no_name_of_their_own_is_refused(name: str, folder: Path) -> None:
     rename(folder, b"a", name.encode())
-    with pytest.raises(FileError, match=f"my.ssp: SystemStructure.ssd: the name of a component, '{name}', must not be"):
+    with pytest.raises(FileError, match=rf"my.ssp: SystemStructure.ssd: line \d+: the name .*, '{name}', must not be"):
         run_study(folder / "plan.toml", folder / "results")

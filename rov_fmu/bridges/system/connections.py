@@ -20,6 +20,8 @@ class Connection(NamedTuple):
     end: tuple[str, str]
     factor: float = 1.0
     """By what the value is multiplied on its way."""
+    offset: float = 0.0
+    """What is added then."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, System
     ends = [_end(text, parts) for text in (first, second)]
     is_port = [name not in parts[component].variables for component, name in ends]
     if is_port == [False, False]:
-        return [checked_connection(Connection(ends[0], ends[1], factor), parts)]
+        return [checked_connection(Connection(ends[0], ends[1], factor), parts, unlike=factor != 1.0)]
     if is_port != [True, True]:
         port, variable = (first, second) if is_port[0] else (second, first)
         raise MismatchError(f"{port} is a terminal and {variable} a variable: a terminal joins a terminal")
@@ -71,7 +73,8 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, System
         both = [parts[component].factor(port, member) for component, port in ends]
         if causalities[0] == "input":
             pair, both = pair[::-1], both[::-1]
-        found.append(checked_connection(Connection(pair[0], pair[1], both[0] / both[1]), parts))
+        factor = both[0] / both[1]
+        found.append(checked_connection(Connection(pair[0], pair[1], factor), parts, unlike=factor != 1.0))
     return found
 
 
@@ -86,8 +89,11 @@ def _end(text: str, parts: Mapping[str, SystemFmu]) -> tuple[str, str]:
     return component, name
 
 
-def checked_connection(one: Connection, parts: Mapping[str, SystemFmu]) -> Connection:
-    """Return a connection if its ends exist, and causalities, types and units fit. Raises MismatchError."""
+def checked_connection(one: Connection, parts: Mapping[str, SystemFmu], *, unlike: bool) -> Connection:
+    """Return a connection if its ends exist, and causalities, types and units fit. Raises MismatchError.
+
+    - `unlike`: True if it is told that units may differ.
+    """
     for component, name in (one.start, one.end):
         if component not in parts:
             raise MismatchError(f"there is no component {shown(component)}{only(component, parts)}")
@@ -102,11 +108,11 @@ def checked_connection(one: Connection, parts: Mapping[str, SystemFmu]) -> Conne
     kinds = [variable.kind for variable in variables]
     if kinds[0] != kinds[1]:
         raise MismatchError(f"{names[0]} is of type {kinds[0]}, and {names[1]} of type {kinds[1]}")
-    if one.factor != 1.0 and kinds[0] != "Real":
+    if (one.factor, one.offset) != (1.0, 0.0) and kinds[0] != "Real":
         raise MismatchError(f"a factor needs type Real, and {names[0]} is of type {kinds[0]}")
     units = [variable.unit for variable in variables]
     bases = [parts[component].base(name) for component, name in (one.start, one.end)]
-    if one.factor == 1.0 and all(units) and units[0] != units[1] and (None in bases or bases[0] != bases[1]):
+    if not unlike and all(units) and units[0] != units[1] and (None in bases or bases[0] != bases[1]):
         raise MismatchError(
             f"{names[0]} is in {units[0]}, and {names[1]} in {units[1]}: "
             "a third entry is the factor that turns one into the other"

@@ -47,7 +47,7 @@ class Master:
         self, folder: str, components: Sequence[str], connections: Sequence[Connection], read: Sequence[Name]
     ) -> None:
         """`folder` has the unpacked FMU of each component, and `read` names the variables that are returned."""
-        self._sources, self._read = {c.end: (c.start, c.factor) for c in connections}, read
+        self._sources, self._read = {c.end: (c.start, c.factor, c.offset) for c in connections}, read
         self._parts = {name: Unpacked(str(path)) for name, path in folders_of(folder, components).items()}
         self._numbers = {name: n for n, name in enumerate(components)}
         self._busy = np.memmap(Path(folder, _BUSY), np.int32, "w+", shape=1)
@@ -107,8 +107,9 @@ class Master:
         """Return what an input gets: a given value, or that of the connected output in the unit of the input."""
         if end not in self._sources:
             return self._inputs[end][self._done]
-        start, factor = self._sources[end]
-        return self._now[start] if factor == 1.0 else factor * self._now[start]
+        start, factor, offset = self._sources[end]
+        is_plain = (factor, offset) == (1.0, 0.0)
+        return self._now[start] if is_plain else factor * self._now[start] + offset
 
     def _outputs(self) -> dict[Name, Any]:
         now: dict[Name, Any] = {}

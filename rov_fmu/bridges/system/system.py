@@ -272,7 +272,7 @@ def _pass_on(system: SystemStructure) -> None:
     Otherwise a current at depth would begin with that at the surface, and jump at the first exchange.
     """
     values = system.values
-    for (source, output), (component, name), factor in system.connections:
+    for (source, output), (component, name), factor, _ in system.connections:
         if output in values[source] and name not in values[component]:
             value = values[source][output]
             with suppress(ValueError):  # it is not within the bounds of the input

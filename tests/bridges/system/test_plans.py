@@ -1,6 +1,7 @@
 """Plans of systems: what is connected, and what does not fit, in one line each; nothing is written then."""
 
 import json
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -272,10 +273,10 @@ def test_a_field_and_ports_of_the_plan_are_handed_on() -> None:
     assert sources["one", "depth_41"].start == sources["two", "depth_41"].start == ("water", "depth_41")
     assert ("one", "depth_42") not in sources
     assert start_of(found, "water", "seabed") == 12.0
-    assert sources["one", "z_top"] == (("crane", "y"), ("one", "z_top"), -0.3048)
+    assert sources["one", "z_top"] == (("crane", "y"), ("one", "z_top"), -0.3048, 0.0)
     assert [start_of(found, "one", name) for name in ("seabed", "difference_top")] == [12.0, 1.0]
-    assert sources["deep", "z"] == (("cage", "V_N"), ("deep", "z"), 10.0)
-    assert sources["cage", "z"] == (("deep", "V_N"), ("cage", "z"), 10.0), "a member is 0.1 of this variable"
+    assert sources["deep", "z"] == (("cage", "V_N"), ("deep", "z"), 10.0, 0.0)
+    assert sources["cage", "z"] == (("deep", "V_N"), ("cage", "z"), 10.0, 0.0), "a member is 0.1 of this variable"
     told = [*system.unconnected(plan, found)]
     assert "one: the velocity of top is the change of its place, because it is not connected" in told
 
@@ -357,6 +358,8 @@ def test_a_plan_becomes_a_system(capsys: Capsys) -> None:
         experiment = part.description.defaultExperiment
         assert (float(experiment.stopTime), float(experiment.stepSize)) == (1.0, 0.1)
     assert [one.factor for one in found.connections if one.end == ("b", "u")] == [2.0]
+    structure = zipfile.ZipFile("my.ssp").read("SystemStructure.ssd").decode()
+    assert structure.count('suppressUnitConversion="true"') == structure.count('factor="2.0"') == 1
     # FMPy validates the structure and the parameter sets, and sets every input that is a connector.
     elements = read_ssd("my.ssp").system.elements
     connectors = {(e.name, c.name) for e in elements for c in e.connectors if c.kind == "input"}
@@ -405,6 +408,13 @@ def test_units_are_alike_if_they_are_the_same_quantity() -> None:
         with pytest.raises(MismatchError, match="a third entry is the factor"):
             connected(f"{first}.y", f"{second}.u", 1.0, has)
         connected(f"{first}.y", f"{second}.u", 0.3048, has)
+
+
+def test_a_terminal_that_is_not_read_whole_is_none() -> None:
+    member = '<TerminalMemberVariable variableName="u" memberName="u"/>'
+    for more, names in (("", ["t"]), ("<Terminal name='inner'/>", []), ("<TerminalStreamMemberVariable/>", [])):
+        text = f"<x><Terminals><Terminal name='t'>{member}{more}</Terminal></Terminals></x>"
+        assert [*parts(a=foreign(terminals=text))["a"].terminals] == names
 
 
 def test_a_loop_with_a_delay_is_allowed() -> None:
