@@ -9,7 +9,14 @@ from fmpy.ssp.ssd import read_ssd
 
 def fly(ssp: str, step: float, steps: int) -> Iterator[dict[str, float]]:
     """Yield the outputs of all components at the end of each step, named as "rov.z"."""
-    system, get, put, advance = read_ssd(ssp).system, {}, {}, []
+    system, get, put, fmus = read_ssd(ssp).system, {}, {}, []
+
+    def pass_on() -> None:
+        """Give every connected input the value of its output, all at once."""
+        ends = [(get[c.startElement, c.startConnector](), c.endElement, c.endConnector) for c in system.connections]
+        for value, *end in ends:
+            put[tuple(end)](value)
+
     with TemporaryDirectory() as folder:
         fmpy.extract(ssp, folder)
         for component in system.elements:
@@ -31,15 +38,14 @@ def fly(ssp: str, step: float, steps: int) -> Iterator[dict[str, float]]:
                 for parameter in binding.parameterValues[0].parameters:
                     put[component.name, parameter.name](parameter.value)
             fmu.enterInitializationMode()
+            fmus.append(fmu)
+        for _ in fmus:  # outputs that follow inputs are right at the start
+            pass_on()
+        for fmu in fmus:
             fmu.exitInitializationMode()
-            advance.append(fmu.doStep)
         outputs = [(e.name, c.name) for e in system.elements for c in e.connectors if c.kind == "output"]
         for n in range(steps):
-            passed = [
-                (get[c.startElement, c.startConnector](), c.endElement, c.endConnector) for c in system.connections
-            ]
-            for value, *end in passed:
-                put[tuple(end)](value)
-            for do_step in advance:
-                do_step(n * step, step)
+            pass_on()
+            for fmu in fmus:
+                fmu.doStep(n * step, step)
             yield {f"{component}.{name}": get[component, name]() for component, name in outputs}

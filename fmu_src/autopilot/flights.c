@@ -69,6 +69,9 @@ void autopilot_fly(const flight *f, ptrdiff_t first, ptrdiff_t last, const volat
         void *const own = f->vehicles + vehicle * f->size;
         double *const at = own, *const waiting = f->waiting + vehicle * f->longest * commands;
         const ptrdiff_t delay = f->delays[vehicle];
+        if (f->done == 0 && f->steps > 0) { /* the first velocity over ground has the current */
+            memcpy(at + commands, row(&f->inputs, vehicle, 0), (size_t)f->others * sizeof(double));
+        }
         for (ptrdiff_t k = 0; k < f->steps && !f->failed[vehicle] && *stop == 0; k++) {
             const ptrdiff_t n = vehicle * f->steps + k;
             double now[SENSORS], next[MOST_THRUSTERS];

@@ -6,8 +6,8 @@ arrays for each call, so that a step of the VideoRay with three inputs and seven
 
 import ctypes
 import os
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import redirect_stdout, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from io import StringIO
@@ -191,16 +191,27 @@ class Instance:
 
         `values` is called before the initialization, and `inputs` in it.
         """
-        from fmpy.fmi1 import FMICallException
+        self.enter(start, stop, tolerance, values)
+        inputs()
+        self.leave()
 
-        try:
+    def enter(
+        self,
+        start: float,
+        stop: float | None,
+        tolerance: float | None = None,
+        values: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Begin the initialization, before which `values` is called. Raises CallError."""
+        with _initializing():
             enter = self.set_up(start, stop, tolerance)
             values()
             enter()
-            inputs()
+
+    def leave(self) -> None:
+        """End the initialization. Raises CallError."""
+        with _initializing():
             self.fmu.exitInitializationMode()
-        except FMICallException as error:
-            check_status(error.status, "initialization")
 
     def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> Callable[[], object]:
         """Tell the instance the times of a run, s, and return the function with which its initialization begins.
@@ -259,6 +270,17 @@ class Instance:
             return status
 
         return step
+
+
+@contextmanager
+def _initializing() -> Iterator[None]:
+    """Raise CallError in place of what FMPy raises."""
+    from fmpy.fmi1 import FMICallException
+
+    try:
+        yield
+    except FMICallException as error:
+        check_status(error.status, "initialization")
 
 
 def check_status(status: int, what: str, time: float | None = None) -> None:

@@ -202,11 +202,16 @@ class VehicleModel(Vehicle):
         return super().step(self._all_inputs(inputs), self._all_states(state), LENGTHS.checked("h", h))
 
     def stepper(
-        self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None
+        self,
+        *,
+        start: Mapping[str, Any] = _NONE,
+        record: str | Sequence[str] | None = None,
+        inputs: Mapping[str, float] = _NONE,
     ) -> "VehicleStepper":
         """Return the vehicle at time 0 s, to be stepped in a loop: with the states of `simulate` to the last bit.
 
         - `start`, `record`: those of `simulate`.
+        - `inputs`: those before the first step, such as the current, which the velocity over ground has at the start.
 
         It goes on from where it was, with everything that its states do not tell, such as commands that wait for the
         dead time. A controller that holds a depth of 1 m:
@@ -218,11 +223,12 @@ class VehicleModel(Vehicle):
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
         from rov_fmu.fmu.variables import units_of
-        from rov_fmu.interface.arguments import checked_record, checked_start
+        from rov_fmu.interface.arguments import checked_record, checked_start, held_inputs
         from rov_fmu.interface.stepper import VehicleStepper
 
         check_coefficients(self.layout, self.coefficients)
         begin = {name: value.item() for name, value in checked_start(start, self.layout, many=False).items()}
+        begin |= held_inputs(self.layout, inputs)
         return VehicleStepper(self, begin, checked_record(record, self.layout, units_of(self.layout)))
 
     def autopilot(self, step: float = 0.02, delay: float = 0.015) -> "Pilot":
@@ -269,9 +275,10 @@ class VehicleModel(Vehicle):
         import numpy as np
 
         seconds, step = (MOTIONS.checked(key, x) for key, x in (("seconds", seconds), ("step", step)))
-        pilot, stepper = self.autopilot(step).hold(**aims), self.stepper(start=start)
+        pilot = self.autopilot(step).hold(**aims)
         if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
             raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")
+        stepper = self.stepper(start=start, inputs=inputs)
         time = step * np.arange(max(1, round(seconds / step)) + 1)
         commands = list[dict[str, float]]()
         for n in range(len(time)):

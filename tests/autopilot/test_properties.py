@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import rov_fmu
 from rov_fmu.autopilot import flights, law
 from rov_fmu.autopilot.allocation import thrust_rows, voltages
 from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
 from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import autopilot_of
-from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
+from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SENSORS, SHARING, STICK, THRUSTER
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -151,6 +152,20 @@ def test_a_hold_begins_without_a_jump() -> None:
     assert np.abs(after.demands[0, 0] - before.demands[0, -1])[[2, 5]] == pytest.approx([0.0, 0.0], abs=1e-9)
     most = made.loops["most"][[2, 5]]
     assert (np.abs(np.diff(after.demands[0], axis=0))[:, [2, 5]] < 0.2 * most).all()
+
+
+def test_a_hold_in_a_current_begins_with_its_velocity_over_ground() -> None:
+    """Otherwise the current would come as a jump of the velocity, and of the force, in the second step."""
+    made, still = autopilot_of(HEAVY), {"V_N": 0.5}
+    rov = rov_fmu.load("bluerov2_heavy")
+    assert rov.stepper(inputs=still).now["vg_N"] == 0.5
+    flown = Flights(HEAVY, made.sharing, [{"z": 10.0}]).fly(
+        made.loops, np.full((3, 6), PLACE), np.tile([0.0, 0.0, 10.0, 0.0, 0.0, 0.0], (3, 1)), made.step, still
+    )
+    assert flown.sensors[0, 0, SENSORS.index("vg_N")] == 0.5
+    force = rov.hold(0.2, still, start={"z": 10.0}, north=0.0, east=0.0, depth=10.0, heading=0.0)["F_1"]
+    assert np.ptp(force) > 6.0
+    assert np.abs(np.diff(force)).max() < 3.0, "it was 7.3 N"
 
 
 @pytest.mark.parametrize("angle", [0.7, 2.5, -1.6])

@@ -138,9 +138,8 @@ def test_a_loop_of_steps_gives_the_results_of_one_simulation(six: VehicleModel) 
     }
     for name, (vehicle, held) in cases.items():
         run = vehicle.simulate(times, {name: values, **held}, start={"x": 1.0})
-        stepper = vehicle.stepper(start={"x": 1.0})
-        still = {"vg_N": 0.0} if "V_N" in held else {}  # it begins without the current
-        assert stepper.now == {name: run[name][0] for name in run.names} | still
+        stepper = vehicle.stepper(start={"x": 1.0}, inputs=held)
+        assert stepper.now == {name: run[name][0] for name in run.names}
         for n, h in enumerate(np.diff(times).tolist()):
             assert stepper.step({name: values[n], **held}, h) == stepper.now
             for state in (*vehicle.layout.state, *vehicle.layout.continued):

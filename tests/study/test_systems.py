@@ -32,6 +32,7 @@ runs = 6
 outputs = ["b.V_N"]
 [figures]
 first = "final(a.V_N)"
+begin = "b.V_N[0]"
 second = "b.V_N[-1]"
 by_name = 'out["b.V_N"][-1]'
 """
@@ -60,6 +61,7 @@ def test_a_study_of_a_system_has_the_rows_of_the_closed_form(
     assert runs["a.speed"].between(0.5, 1.5).all()
     np.testing.assert_allclose(runs["first"], runs["a.speed"] * (1.0 - 0.5), rtol=1e-12)
     np.testing.assert_allclose(runs["second"], 1.0 - 0.5 * runs["a.speed"], rtol=1e-12)  # by V of a, a step before
+    np.testing.assert_allclose(runs["begin"], 1.0 - 0.5 * runs["a.speed"], rtol=1e-12)  # by V of a at the start
     assert runs["second"].tolist() == runs["by_name"].tolist()
     ends = results.trajectories().query("t == 3.0")["b.V_N"]
     assert ends.tolist() == runs["second"].tolist()

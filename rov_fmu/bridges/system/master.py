@@ -70,15 +70,24 @@ class Master:
     ) -> list[float]:
         """Make and initialize the instances, and return the variables at the start. Raises RunError.
 
+        Outputs are passed on during the initialization, so that those which follow an input are right at the start: a
+        velocity over ground has the current. Ecos and libcosim do the same.
+
         `inputs` has the values of inputs that are not connected, one for each step.
         """
         self.end()
         self._start, self._step, self._done, self._warnings = start, step, 0, {}
+        self._inputs, self._sets = inputs, grouped([*inputs, *self._sources])
         for name, unpacked in self._parts.items():
             with self._calling(name):
                 fmu = self._fmus[name] = Instance(unpacked, logging=True)
-                fmu.begin(start, stop, values=partial(fmu.set, values.get(name, {})))
-        self._inputs, self._sets = inputs, grouped([*inputs, *self._sources])
+                fmu.enter(start, stop, values=partial(fmu.set, values.get(name, {})))
+        for _ in self._fmus:  # an output may follow an input through as many components
+            self._now = self._outputs()
+            self._pass_on()
+        for name, fmu in self._fmus.items():
+            with self._calling(name):
+                fmu.leave()
         self._now = self._outputs()
         return self._row()
 
@@ -86,9 +95,7 @@ class Master:
         """Take some steps, and return the variables after each one. Raises RunError."""
         rows = []
         for _ in range(count):
-            for component, names in self._sets.items():
-                with self._calling(component):
-                    self._fmus[component].set({name: self._passed((component, name)) for name in names})
+            self._pass_on()
             for name, fmu in self._fmus.items():
                 with self._calling(name):
                     fmu.step(self._time, self._step)
@@ -102,6 +109,12 @@ class Master:
         for fmu in self._fmus.values():
             fmu.end()
         self._fmus = {}
+
+    def _pass_on(self) -> None:
+        """Set all inputs that are connected or given."""
+        for component, names in self._sets.items():
+            with self._calling(component):
+                self._fmus[component].set({name: self._passed((component, name)) for name in names})
 
     def _passed(self, end: Name) -> Any:
         """Return what an input gets: a given value, or that of the connected output in the unit of the input."""

@@ -382,7 +382,7 @@ def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     names = [("a", "V_N"), ("b", "V_N")]
     rows = run_system(structure, tmp_path, names, 1.0, 3).rows
     assert rows[:, 0].tolist() == [0.0, 0.25, 0.5, 0.5]
-    assert rows[:, 1].tolist() == [0.5, 1.0, 1.0 - 0.5 * 0.25, 1.0 - 0.5 * 0.5]
+    assert rows[:, 1].tolist() == [1.0, 1.0, 1.0 - 0.5 * 0.25, 1.0 - 0.5 * 0.5]
     # Half the step: V_N of the first half a step before.
     halved = run_system(structure, tmp_path, names, 1.0, 3, parts=2).rows
     assert halved[:, 1].tolist() == [0.5, 1.0 - 0.5 * 0.125, 1.0 - 0.5 * 0.375, 1.0 - 0.5 * 0.5]

@@ -46,6 +46,10 @@ class Companion(Fmi2Slave):  # type: ignore[misc]
         self.shape: dict[str, Any] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
         """Whom and what it serves: the arguments of `companion`, which its FMU has as a resource."""
 
+    def enter_initialization_mode(self) -> None:
+        """Compute the outputs, because importers pass them on before the end of the initialization."""
+        self.exit_initialization_mode()
+
     def register(self, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
         """Take its variables with the start values of its shape, its author, and a default experiment."""
         given, (stop, step) = self.shape.get("start", {}), self.shape.get("experiment", (60.0, step))
