@@ -6,9 +6,11 @@ those it was given.
 """
 
 import ast
+import re
 from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import pairwise
+from keyword import iskeyword
 from math import e, inf, nan, pi
 from typing import Any
 
@@ -94,7 +96,9 @@ class FigureExpression:
         except ExpressionError:
             raise
         except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError) as error:
-            raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
+            words = [name for name in re.findall(r"[\w.]+", text) if _is_word(name)]
+            hint = f"; {words[0]} ends with a word of Python: write {BY_NAME}[{words[0]!r}]" if words else ""
+            raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}{hint}") from error
         self._functions = {"__builtins__": {}, **functions, **_OWN}
 
     def value(self, values: Mapping[str, Any]) -> Any:
@@ -168,6 +172,11 @@ class _Reader(ast.NodeTransformer):
             ends = (index.lower, index.upper, index.step)
             return _call("_slice", array, *(ast.Constant(None) if one is None else self.visit(one) for one in ends))
         return _call("_index", array, self.visit(index))
+
+
+def _is_word(name: str) -> bool:
+    """Return True for a variable whose name Python takes for a word of its own, such as `w.in`."""
+    return iskeyword(name.rpartition(".")[2]) and name not in ("and", "or", "not", "if", "else")
 
 
 def _call(name: str, *given: ast.expr) -> ast.Call:

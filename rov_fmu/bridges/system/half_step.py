@@ -36,8 +36,13 @@ class HalfStep(NamedTuple):
 
 
 def half_step(rows: Array, halved: Array, units: Sequence[str]) -> HalfStep:
-    """Compare the rows of a run with those of one that took half the step. A turn is no change of an angle."""
-    changes, ranges = np.abs(halved - rows), np.ptp(rows, axis=0)
+    """Compare the rows of a run with those of one that took half the step, where both are finite.
+
+    A turn is no change of an angle.
+    """
+    both = np.isfinite(rows) & np.isfinite(halved)
+    changes = np.abs(np.subtract(halved, rows, out=np.zeros(rows.shape), where=both))
+    ranges = rows.max(axis=0, where=both, initial=-np.inf) - rows.min(axis=0, where=both, initial=np.inf)
     angles = [unit == "rad" for unit in units]
     changes[:, angles] = np.abs(np.remainder(changes[:, angles] + np.pi, 2.0 * np.pi) - np.pi)
     shares = np.divide(changes, ranges, out=np.zeros_like(changes), where=ranges > 0.0)

@@ -4,10 +4,11 @@ So an input gets the output that another FMU had at the beginning of the step. T
 and the result does not depend on the order of the FMUs. Ecos and libcosim do the same.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from math import isnan
+from math import isinf, isnan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -52,6 +53,7 @@ class Master:
         self._numbers = {name: n for n, name in enumerate(components)}
         self._busy = np.memmap(Path(folder, _BUSY), np.int32, "w+", shape=1)
         self._busy[0] = -1
+        self._guard = os.open(Path(folder, _BUSY), os.O_RDONLY)
         self._wanted = grouped({*read, *(c.start for c in connections)})
         self._fmus: dict[str, Instance] = {}
         self._warnings: dict[str, float] = {}
@@ -105,10 +107,11 @@ class Master:
         return rows
 
     def end(self) -> None:
-        """End the instances."""
-        for fmu in self._fmus.values():
-            fmu.end()
-        self._fmus = {}
+        """End the instances. Raises RunError."""
+        ending, self._fmus = self._fmus, {}
+        for name, fmu in ending.items():
+            with self._calling(name):
+                fmu.end()
 
     def _pass_on(self) -> None:
         """Set all inputs that are connected or given."""
@@ -132,6 +135,8 @@ class Master:
                 for name, value in zip(names, values, strict=True):
                     if isinstance(value, float) and isnan(value):
                         raise RunError(f"reading values at {self._time:.6g} s: {name} is no number (NaN)")
+                    if isinstance(value, float) and isinf(value):
+                        self._warn(f"{component}: {name} is infinite")
                     now[component, name] = value
         return now
 
@@ -152,9 +157,14 @@ class Master:
         forget_message()
         try:
             yield
+            os.fstat(self._guard)  # a component that closes it is told, and not the next one
         except Exception as error:  # FMPy raises that itself
             reason = brief(self._parts[name].without_folder(error), 240)
             told = "" if (message := last_message()) in reason else brief(message, 240)
             raise RunError(f"{name}: {reason}{told}") from error
-        if (text := last_message(f"{name}: ")) and len(self._warnings) < _MOST_WARNINGS:
+        if text := last_message(f"{name}: "):
+            self._warn(text)
+
+    def _warn(self, text: str) -> None:
+        if len(self._warnings) < _MOST_WARNINGS:
             self._warnings.setdefault(brief(text, 240), self._time)
