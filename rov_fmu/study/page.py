@@ -1,6 +1,7 @@
 """The page about a study, one HTML file: a table of figures and of what varied, and their plots."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from rov_fmu.io.messages import first_of, listed
 from rov_fmu.report.templates import inline_script, page
@@ -27,7 +28,7 @@ _CONSTANT = 1e-6
 
 def study_page(results: Results) -> str:
     """Return the page about the finished runs as HTML. It is the same for the same results. Raises FileError."""
-    runs, grid = results.runs, _grid(results)
+    runs = results.runs
     told = {name: statistics(runs[name]) for name in (*results.figures, *results.parameters)}
     return page(
         "study.html.j2",
@@ -44,15 +45,9 @@ def study_page(results: Results) -> str:
             }
             for name, found in told.items()
         ],
-        grid=grid,
+        grid=_grid(results),
         plots=[
-            *(
-                plots.over_grid(name, results, grid)
-                if grid
-                else plots.distribution(name, runs[name].dropna(), told[name])
-                for name in results.figures
-                if _varies(told[name])
-            ),
+            *(plot for name in results.figures if _varies(told[name]) for plot in _plots(name, results, told[name])),
             *(plots.band(name, results) for name in results.outputs if len(results.failed) < len(runs)),
         ],
         script=inline_script("plots.js"),
@@ -64,6 +59,23 @@ def _grid(results: Results) -> Sequence[str]:
     if results.plan["sampler"] != "grid" or len(results.parameters) not in (1, 2):
         return ()
     return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
+
+
+def _plots(name: str, results: Results, told: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+    """Yield the plots of a figure: over the grid, or its distribution and over what varied most with it."""
+    if grid := _grid(results):
+        yield plots.over(name, results, grid, joined=True)
+    else:
+        yield plots.distribution(name, results.runs[name].dropna(), told)
+        if most := _most_with(name, results):
+            yield plots.over(name, results, most, joined=False)
+
+
+def _most_with(name: str, results: Results) -> Sequence[str]:
+    """Return what varied most with a figure, by the correlation of their ranks; none if nothing did."""
+    ranks = results.runs[[name, *results.parameters]].dropna().rank()
+    varied = [one for one in results.parameters if ranks[one].nunique() > 1]
+    return sorted(varied, key=lambda one: -abs(ranks[name].corr(ranks[one])))[:1]
 
 
 def _varies(told: Mapping[str, float]) -> bool:

@@ -39,8 +39,8 @@ def distribution(name: str, values: Any, told: Mapping[str, float]) -> dict[str,
     return _plot(f"Distribution of {name}", draw, name)
 
 
-def over_grid(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
-    """Plot a figure over the variable with more values, with a line for some values of the other one."""
+def over(name: str, results: Results, grid: Sequence[str], *, joined: bool) -> dict[str, Any]:
+    """Plot a figure over the first variable, with a line for some values of the other one; `joined`: by lines."""
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
 
@@ -50,10 +50,9 @@ def over_grid(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any
             some = evenly(np.unique(runs[other]).tolist())
             lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
         for (label, line), color in zip(lines, LINES, strict=False):
-            marker = "o" if len(line) <= _MARKED else ""
-            ax.plot(
-                line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label
-            )
+            marker = "o" if len(line) <= _MARKED or not joined else ""
+            style = {"color": LIGHT[color], "marker": marker, "markersize": 3.5, "linewidth": 1.4 * joined}
+            ax.plot(line[along], line[name], label=label, **style)
         for other in others:
             title = with_unit(other, results.units[other])
             ax.figure.legend(title=title, handlelength=1.0, loc="outside right upper")

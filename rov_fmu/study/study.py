@@ -65,7 +65,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Study:
     recorded = [*dict.fromkeys([*plan.kept, *sorted(named - {*design.names})])]
     names = [name for name, variable in has.items() if variable.causality == "input"]
     told = [*design.warnings()]
-    if names and not {*names} & {*inputs, *design.names, *plan.set}:
+    if names and not plan.system and not {*names} & {*inputs, *design.names, *plan.set}:
         told.append(f"the plan gives no input of the FMU ({listed(names[:5])}): all keep their start values")
     return Study(plan, model, design.names, design.rows(), inputs, recorded, told)
 

@@ -91,7 +91,8 @@ TABLES = {
 """Tables after [vary]."""
 FIGURES = {
     'end = "max(w.in)"': (
-        "figures.end = 'max(w.in)': is no expression: invalid syntax; w.in ends with a word of Python: write out['w.in']"
+        "figures.end = 'max(w.in)': is no expression: invalid syntax; "
+        "w.in ends with a word of Python: write out['w.in']"
     ),
     'end = "u[-1"': "figures.end = 'u[-1': is no expression: '[' was never closed",
     'end = "q[-1]"': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",

@@ -27,12 +27,12 @@ class HalfStep(NamedTuple):
     """The largest change of all variables at each time, relative to their ranges."""
 
     def words(self, names: Sequence[Name]) -> str:
-        """Return a line about the variable that half the step changes most, and whether numbers may be trusted."""
+        """Return a line that begins with whether numbers may be trusted, and names what half the step changes most."""
         worst = int(self.typical.argmax())
         of = f"half the step changes {'.'.join(names[worst])} by {self.typical[worst]:.1%} of its range"
         if self.typical[worst] > _TRUSTED:
-            return f"{of}: the numbers of this step are not to be trusted, take a smaller one"
-        return f"{of}, and other connected variables by less"
+            return f"untrustworthy: {of}: take a smaller step"
+        return f"trustworthy: {of}, and other connected variables by less"
 
 
 def half_step(rows: Array, halved: Array, units: Sequence[str]) -> HalfStep:

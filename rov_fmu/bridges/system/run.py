@@ -30,6 +30,13 @@ _QUANTITIES = {"N": "force", "m": "place", "rad": "angle", "m/s": "velocity", "r
 """The words for what a panel shows, by its unit."""
 _NODE, _LEVEL, _PLACE = "_p[0-9]+$", "_[0-9]+$", "^[xyz]$"
 """Members of terminals: a tether's at each node, a profile's at each level, and the place of a vehicle or an end."""
+_AIMS = {"x": "u", "y": "v", "z": "w", "phi": "p", "theta": "q", "psi": "r"}
+"""What an autopilot holds, each with the axis of its mode."""
+_HOLDS = 1.5
+"""From where on a mode of an autopilot holds a place or an angle."""
+_QUATERNION = "^(eta|epsilon_.)$"
+_TOLD = f"{_QUATERNION}|^(vg_[NED]|A_[NED]|[xyz]|[uvwpqr])$"
+"""Members of terminals that say in other words how a vehicle moves, or are told only so that another can compute."""
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
@@ -70,8 +77,9 @@ def _shown_starts(structure: SystemStructure) -> dict[Name, None]:
 
 
 def passed(structure: SystemStructure) -> list[Name]:
-    """Return the outputs that are connected and are numbers, without those of the nodes of tethers."""
-    starts = _shown_starts(structure)
+    """Return the outputs that are connected and are numbers, without those of the nodes of tethers and quaternions,
+    which may change by nothing but rounding while a vehicle does not turn."""
+    starts = _shown_starts(structure).keys() - _members(structure, _QUATERNION)
     return [name for name in recorded_names(structure) if name in starts]
 
 
@@ -127,32 +135,74 @@ def system_csv(read: Sequence[Name], step: float, rows: Array, half: HalfStep | 
 
 
 def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
-    """Return the plot of some variables, or of those that change and pass between the components, and of forces that no
-    terminal has, such as the tension of a tether.
+    """Return the plot of some variables. Without any: how far what an autopilot holds is from its aims, then what else
+    is connected and changes, once, and forces that no terminal has, such as the tension of a tether.
 
     Each quantity has a panel: what a component, or one end or point of it, has in one unit.
     """
-    columns = {".".join(name): n for n, name in enumerate(read)}
-    plain = [name for name in columns if not re.search("_p?[0-9]+$", name)] or columns
-    passed = dict.fromkeys([".".join(name) for name in _shown_starts(structure)] or plain)
+    columns = {name: n for n, name in enumerate(read)}
     parts, members = structure.parts, _members(structure)
+    off = {} if names else deviations(structure, read, rows)
+    plain = [name for name in read if not re.search("_p?[0-9]+$", name[1])] or read
     alone = [name for name in read if name not in members and parts[name[0]].variables[name[1]].unit == "N"]
-    passed |= dict.fromkeys(map(".".join, alone))
-    chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
-    panels = [*_panels(structure, [read[columns[name]] for name in chosen], is_chosen=bool(names))]
+    hidden = _members(structure, _TOLD) - {(component, name) for component, name in read if name in _AIMS} | off.keys()
+    chosen = [(component, name) for component, _, name in (text.partition(".") for text in names)] or [
+        name
+        for name in dict.fromkeys([*(_shown_starts(structure) or plain), *alone])
+        if name in columns and name not in hidden and (rows[:, columns[name]] != rows[0, columns[name]]).any()
+    ]
+    values = {name: rows[:, columns[name]] for name in chosen} | off
+    panels = [(unit, title + " from its aim", some) for unit, title, some in _panels(structure, [*off], is_chosen=True)]
+    panels += _panels(structure, chosen, is_chosen=bool(names))
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots(max(1, len(panels)), sharex=True, squeeze=False)[:, 0]
         for panel, (unit, title, some) in zip(axes, panels, strict=False):
             factor, printed = (100.0, "%") if unit == "1" else in_degrees(unit)
-            for color, (component, name) in zip(_COLORS, some, strict=False):
-                values = factor * rows[:, columns[f"{component}.{name}"]]
-                panel.plot(step * np.arange(len(rows)), values, linewidth=1.2, label=name, color=LIGHT[color])
+            for color, name in zip(_COLORS, some, strict=False):
+                line = step * np.arange(len(rows)), factor * values[name]
+                panel.plot(*line, linewidth=1.2, label=name[1], color=LIGHT[color])
             name_axes(panel, title, printed)
-            panel.legend(loc="center left", bbox_to_anchor=(1.1, 0.5))
+            panel.ticklabel_format(useOffset=False)
+            beside = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(some), "borderpad": 0.0}
+            panel.legend(**beside, frameon=False, handlelength=1.0, columnspacing=1.0)
         axes[-1].set_xlabel("time (s)")
 
     return svg_file(draw, (8.6, 1.0 + 1.9 * max(1, len(panels))), salt="system")
+
+
+def deviations(structure: SystemStructure, read: Sequence[Name], rows: Array) -> dict[Name, Array]:
+    """Return how far each place and angle is from where an autopilot holds it, by its name; NaN while none does."""
+    columns = {name: n for n, name in enumerate(read)}
+    sources = {one.end: one.start for one in structure.connections if one.start in columns}
+    found: dict[Name, Array] = {}
+    for component, part in structure.parts.items():
+
+        def series(name: str, component: str = component, part: SystemFmu = part) -> Array:
+            if source := sources.get((component, name)):
+                return rows[:, columns[source]]
+            return np.full(len(rows), float(structure.values[component].get(name, part.variables[name].start)))
+
+        for name, axis in _AIMS.items():
+            sensor = sources.get((component, name))
+            if sensor and {f"mode_{axis}", f"ref_{name}"} <= part.variables.keys():
+                change = series(name) - series(f"ref_{name}")
+                if part.variables[name].unit == "rad":
+                    change = np.remainder(change + np.pi, 2.0 * np.pi) - np.pi
+                if (holds := series(f"mode_{axis}") >= _HOLDS).any() and change.any():
+                    found[sensor] = np.where(holds, change, np.nan)
+    return found
+
+
+def held_words(structure: SystemStructure, read: Sequence[Name], rows: Array) -> str:
+    """Return a line about how well autopilots hold places and angles once they have come there; none without any."""
+    most = {"m": (100.0, "cm", 0.0), "rad": (180.0 / np.pi, "deg", 0.0)}
+    for (component, name), change in deviations(structure, read, rows).items():
+        factor, printed, other = most[unit := structure.parts[component].variables[name].unit]
+        late = np.abs(change[len(rows) // 2 :])
+        most[unit] = factor, printed, max(other, factor * late.max(where=np.isfinite(late), initial=0.0))
+    told = [f"{largest:.2g} {printed}" for _, printed, largest in most.values() if largest]
+    return f"from half of the run on: at most {' and '.join(told)} from the aims of the autopilot" if told else ""
 
 
 def _panels(

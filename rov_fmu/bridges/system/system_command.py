@@ -15,7 +15,7 @@ from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
-from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system, system_csv
+from rov_fmu.bridges.system.run import held_words, passed, picture, recorded_names, run_system, system_csv
 from rov_fmu.bridges.system.ssp import ssp_content
 from rov_fmu.bridges.system.system import elsewhere, files_of, made, unconnected
 from rov_fmu.fmu.archive import is_unchanged
@@ -58,6 +58,8 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
             rows, warnings = run_system(structure, path, read, plan.step, plan.steps, begun, 1, plan.time_limit)
             for warning in warnings:
                 shown.print(f"warning: {warning}")
+            if words := held_words(structure, read, rows):
+                shown.print(words)
             if passed(structure):
                 half, changes = _half_step(structure, plan, path, dict(zip(read, rows.T, strict=True)), shown)
             motion, plot = results

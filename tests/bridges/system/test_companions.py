@@ -402,7 +402,7 @@ def test_the_command_tells_what_half_the_step_changes(tmp_path: Path, capsys: Ca
     assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == 0
     printed = capsys.readouterr()
     assert "V_N by " in printed.err
-    assert "of its range: the numbers of this step are not to be trusted" in printed.err
+    assert "untrustworthy: half the step changes" in printed.err
     (row,) = (line.split() for line in printed.out.splitlines() if line.startswith("a.V_N"))
     motion = np.genfromtxt(tmp_path / "my.csv", delimiter=",", names=True, deletechars="")
     assert row[:4] == ["a.V_N", "m/s", f"{motion['a.V_N'].min():.4g}", f"{motion['a.V_N'].max():.4g}"]
