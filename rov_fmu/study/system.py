@@ -114,4 +114,4 @@ def half_step_words(study: Study, model: SystemModel) -> str:
             return f"half the step was tried in one run, which cannot be done: {who}{error}"
     rows, halved = (np.array([*run.values()], np.float64).T for run in runs)
     half = half_step(rows, halved, [model.variables[name].unit for name in names])
-    return f"in one run, {half.words([*map(split, names)])}"
+    return f"one run is {half.words([*map(split, names)])}"

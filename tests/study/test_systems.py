@@ -54,7 +54,9 @@ def test_a_study_of_a_system_has_the_rows_of_the_closed_form(
 ) -> None:
     assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
     # a.z falls by half in the last step, which b hears of after the run; with half the step, half a step before.
-    assert "in one run, half the step changes a.V_N by 0.0% of its range" in capsys.readouterr().err
+    assert "one run is trustworthy: half the step changes a.V_N by 0.0% of its range" in capsys.readouterr().err
+    page = (folder / "results" / "study.html").read_text(encoding="utf-8")
+    assert "first over a.speed" in page, "what varied most with it"
     results = run_study(folder / "plan.toml", folder / "results", scheduler=scheduler)
     runs = results.runs
     assert (runs.status == "done").all()
