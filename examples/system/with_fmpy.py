@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import fmpy
 from fmpy.ssp.ssd import read_ssd
@@ -9,7 +10,9 @@ from fmpy.ssp.ssd import read_ssd
 
 def fly(ssp: str, step: float, steps: int) -> Iterator[dict[str, float]]:
     """Yield the outputs of all components at the end of each step, named as "rov.z"."""
-    system, get, put, fmus = read_ssd(ssp).system, {}, {}, []
+    system, fmus = read_ssd(ssp).system, []
+    get: dict[Any, Any] = {}
+    put: dict[Any, Any] = {}
 
     def pass_on() -> None:
         """Give every connected input the value of its output, all at once."""

@@ -46,7 +46,7 @@ def test_inputs_are_held_from_each_time_to_the_next(foreign: Callable[..., Path]
 @pytest.mark.parametrize("step", [0.01, 0.05, 0.1])
 def test_no_step_passes_the_end_by_rounding(step: float, foreign: Callable[..., Path]) -> None:
     """19.990000000000002 + 0.01 is more than 20, which an FMU has to refuse. The other steps keep their length."""
-    times = step * np.arange(round(20.0 / step) + 1)
+    times = step * np.arange(round(20.0 / step) + 1, dtype=np.float64)
     assert any(t + step > times[-1] for t in times[:-1])
     fmu = Fmu.open(foreign())
     found = fmu.run(times, {}, ["y"], {"mode": 10.0, "a": 1.0})["y"]

@@ -278,7 +278,8 @@ class _Reader:
             raise ValueError(f"{where}{target} takes one connection, and has one with {self._ways[target].source}")
         way = self._ways[target] = _Way(sources[0], *_linear(one, where))
         if not way.suppressed and any(" of a system" in self._kinds[end] for end in ends):
-            _check_units(*(self._units.get(end, "") for end in ends), f"{where}{ends[0]} ")
+            first, second = (self._units.get(end, "") for end in ends)
+            _check_units(first, second, f"{where}{ends[0]} ")
 
     def _bindings(self, element: Any, place: str) -> None:
         """Note the values that are given to a system or a component, over those that are given in it."""

@@ -11,6 +11,7 @@ from rov_fmu.bridges.system.connections import Connection, SystemStructure
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.run import SystemRun, run_system
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.messages import FileError
 from tests.fmus.conftest import foreign
 
@@ -20,7 +21,7 @@ __all__ = ["foreign"]
 def run(fmu: Path, mode: int, limit: float = 60.0) -> SystemRun:
     """Run three components of an FMU, of which the one in the middle has a mode."""
     part = SystemFmu.open(fmu)
-    values = {"before": {}, "strange": {"mode": mode, "a": 1.0}, "after": {}}
+    values: dict[str, dict[str, Value]] = {"before": {}, "strange": {"mode": mode, "a": 1.0}, "after": {}}
     connections = [Connection(("strange", "y"), ("before", "u"))] * (mode != 13)
     system = SystemStructure(dict.fromkeys(values, part), values, connections)
     return run_system(system, fmu, [("strange", "y"), ("before", "y")], 0.1, 10, time_limit=limit)
