@@ -75,7 +75,8 @@ def _most_with(name: str, results: Results) -> Sequence[str]:
     """Return what varied most with a figure, by the correlation of their ranks; none if nothing did."""
     ranks = results.runs[[name, *results.parameters]].dropna().rank()
     varied = [one for one in results.parameters if ranks[one].nunique() > 1]
-    return sorted(varied, key=lambda one: -abs(ranks[name].corr(ranks[one])))[:1]
+    likeness = ranks.corr().abs().to_dict()[name]
+    return sorted(varied, key=lambda one: -likeness[one])[:1]
 
 
 def _varies(told: Mapping[str, float]) -> bool:

@@ -51,8 +51,8 @@ def over(name: str, results: Results, grid: Sequence[str], *, joined: bool) -> d
             lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
         for (label, line), color in zip(lines, LINES, strict=False):
             marker = "o" if len(line) <= _MARKED or not joined else ""
-            style = {"color": LIGHT[color], "marker": marker, "markersize": 3.5, "linewidth": 1.4 * joined}
-            ax.plot(line[along], line[name], label=label, **style)
+            style: dict[str, Any] = {"color": LIGHT[color], "marker": marker, "markersize": 3.5, "label": label}
+            ax.plot(line[along], line[name], linewidth=1.4 * joined, **style)
         for other in others:
             title = with_unit(other, results.units[other])
             ax.figure.legend(title=title, handlelength=1.0, loc="outside right upper")
