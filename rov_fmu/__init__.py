@@ -47,7 +47,7 @@ HOMES = {
         "vehicle.shipped": "SHIPPED find_vehicle",
         "vehicle.steady": "Steady",
         "vehicle.uncertainty": "Uncertainty",
-        "vehicle.vehicle": "Vehicle VehicleFileError load_vehicle",
+        "vehicle.vehicle": "Vehicle VehicleFileError VehicleWarning load_vehicle",
         "vehicle.writer": "write_tuned write_vehicle",
     }.items()
     for name in names.split()

@@ -62,6 +62,7 @@ from rov_fmu.vehicle.steady import Steady as Steady
 from rov_fmu.vehicle.uncertainty import Uncertainty as Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle as Vehicle
 from rov_fmu.vehicle.vehicle import VehicleFileError as VehicleFileError
+from rov_fmu.vehicle.vehicle import VehicleWarning as VehicleWarning
 from rov_fmu.vehicle.vehicle import load_vehicle as load_vehicle
 from rov_fmu.vehicle.writer import write_tuned as write_tuned
 from rov_fmu.vehicle.writer import write_vehicle as write_vehicle

@@ -388,14 +388,18 @@ def _simulate(vehicle: Path, wanted: tuple[str, ...], **options: Any) -> None:
 
 @contextmanager
 def _warnings_printed() -> Iterator[None]:
-    """Print the warnings for the user once the block is done, each in one line and once."""
-    with warnings.catch_warnings(record=True) as caught:
+    """Print the warnings for the user as they come, each in one line and once."""
+    told = set[str]()
+
+    def tell(message: Warning | str, *_: object) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            _warn(str(message))
+
+    with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
-        try:
-            yield
-        finally:
-            for message in dict.fromkeys(str(warning.message) for warning in caught):
-                _warn(message)
+        warnings.showwarning = tell
+        yield
 
 
 def _warn(message: str) -> None:
@@ -434,8 +438,7 @@ def _fly(
     from rov_fmu.interface.fly_command import open_in_browser, write_fly_page
     from rov_fmu.report.console import print_end
 
-    with _warnings_printed():
-        files = write_fly_page([vehicle, against] if against else [vehicle], recording, output, force=force)
+    files = write_fly_page([vehicle, against] if against else [vehicle], recording, output, force=force)
     if output:
         print_end(files, "open it in a browser")
     else:

@@ -10,7 +10,6 @@ step h of the controller. With 2.5 h in it, a loop in which all exchange their v
 100 ms. It is at most 3/s for translations and 8/s for turns, because vehicle files without a lag would allow any.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -22,7 +21,6 @@ from rov_fmu.autopilot.law import AXES, LOOP, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.schema import UNDETERMINED
 from rov_fmu.vehicle.vehicle import Vehicle
 
 STEP, DELAY = 0.02, 0.015
@@ -93,16 +91,6 @@ def _lag(vehicle: Vehicle, axis: Axis) -> float:
     curves = [vehicle.layout.curve_of[one.name] for one in vehicle.layout.thrusters_along(axis)]
     dead = vehicle.coefficients.get("T_d", 0.0)
     return dead + max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=0.0)
-
-
-def unknown_lags(vehicle: Vehicle) -> Iterator[str]:
-    """Yield a sentence for each lag of thrusters that is not known, on which gains rest: no test tells it, or its 95 %
-    interval is wider than the lag."""
-    for curve in (curve for curve in vehicle.layout.curves if curve.has_lag):
-        lag, basis = vehicle[curve.coefficient("T")], vehicle.basis[curve.coefficient("T")]
-        if basis.source == UNDETERMINED or (basis.interval and basis.interval[1] > 2.0 * lag):
-            ends = " ({:.2g} to {:.2g} s)".format(*basis.interval) if basis.interval else ""
-            yield f"the lag of {curve.name} thrust is not known{ends}, and the gains are for {lag:.2g} s"
 
 
 def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing:

@@ -33,8 +33,8 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     holds = ["It has no thrusters: its inputs are forces from outside."]
     if vehicle.layout.actuators:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
-        tested = [f"{name} from {ends[0]:.0%} to {ends[1]:.0%}" for name, ends in vehicle.tested.items()]
-        holds += [f"Tests of each axis had commands of {listed(tested)}."] if tested else []
+        tested = vehicle.tested_commands
+        holds += [f"Tests of each axis had commands of {tested}."] if tested else []
     holds += beyond_stated(vehicle)
     holds += [
         f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)

@@ -134,19 +134,17 @@ def _allocation(job: Job) -> Exported:
 
 
 def _autopilot(job: Job) -> Exported:
-    from rov_fmu.autopilot.gains import unknown_lags
     from rov_fmu.bridges.autopilot.files import autopilot_files
 
     named = job.path / f"{job.vehicle.identifier}_autopilot.fmu"
     words = f"connect {named} with the FMU of the vehicle: pose, velocities and thrusters (docs/system.md)"
-    return Exported(autopilot_files(job.vehicle), [*unknown_lags(job.vehicle)], following=words)
+    return Exported(autopilot_files(job.vehicle), following=words)
 
 
 def _gains(job: Job) -> Exported:
-    from rov_fmu.autopilot.gains import unknown_lags
     from rov_fmu.bridges.autopilot.files import gains_yaml
 
-    return Exported(gains_yaml(job.vehicle), [*unknown_lags(job.vehicle)])
+    return Exported(gains_yaml(job.vehicle))
 
 
 def _ardusub_gains(job: Job) -> Exported:

@@ -14,7 +14,7 @@ from rov_fmu.io.messages import InputError, only, shown
 from rov_fmu.io.numbers import LENGTHS, MOTIONS
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.steady import Steady, steady_with
-from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle, warn_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -38,10 +38,13 @@ def load(vehicle: str | Path | Vehicle) -> "VehicleModel":
 
         rov_fmu.load("bluerov2").response("surge", 0.3)  # V_ss, m/s, and Tau, s, at 30 %
 
-    Raises FileError, a ValueError, with one line for each mistake.
+    Raises FileError, a ValueError, with one line for each mistake. Warns (VehicleWarning) where the file says itself
+    that the vehicle may not be trusted everywhere.
     """
     if not isinstance(vehicle, str | Path | Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be the name of a vehicle that ships, or the path of a file")
+    if isinstance(vehicle, Vehicle):
+        warn_of(vehicle, vehicle.identifier)
     loaded = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(find_vehicle(vehicle))
     return VehicleModel(**{field.name: getattr(loaded, field.name) for field in fields(loaded)})
 

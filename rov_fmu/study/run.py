@@ -193,6 +193,7 @@ def _blocks(study: Study) -> Iterator[Block]:
 def _told(study: Study, blocks: Sequence[Block]) -> dict[str, Any]:
     """Return what the folder says of the study."""
     plan, has = study.plan, study.model.variables
+    caution = study.model.vehicle.caution if study.model.vehicle else ""
     told = {name: has[name] for name in (*study.varied, *study.recorded)}
     return {
         "made_by": f"rov-fmu {__version__}",
@@ -202,7 +203,7 @@ def _told(study: Study, blocks: Sequence[Block]) -> dict[str, Any]:
         "columns": {"parameters": [*study.varied], "figures": [*plan.figures], "outputs": [*plan.kept]},
         "units": {name: variable.unit or "1" for name, variable in told.items()},
         "descriptions": {name: variable.description for name, variable in told.items()},
-        "warnings": [*study.warnings],
+        "warnings": [*filter(None, [caution]), *study.warnings],
         "runs": len(study.rows),
         "files": [block.name for block in blocks],
     }

@@ -22,7 +22,7 @@ from rov_fmu.equation.python.step import Memory, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, listed, one_line, shown
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, parse_toml, problem_lines
 from rov_fmu.vehicle.checks import check_parts, no_thrust
@@ -33,6 +33,7 @@ from rov_fmu.vehicle.schema import (
     DRIVING,
     FORMAT,
     NOT_GIVEN,
+    UNDETERMINED,
     UNTUNED,
     Alternative,
     Basis,
@@ -58,6 +59,10 @@ TUNED = "Tuned to"
 
 class VehicleFileError(FileError):
     """A vehicle file that cannot be used. Each mistake is a line with file, key, value and what is allowed."""
+
+
+class VehicleWarning(UserWarning):
+    """A vehicle that is loaded for use has doubts in its own file. The text has `Vehicle.caution`."""
 
 
 Values = Mapping[str, float]
@@ -219,8 +224,9 @@ class Vehicle:
 
     @property
     def summary(self) -> str:
-        """The description, followed by the coefficients that were set by hand."""
-        return f"{self.description}{self._by_hand(' (', ')')}"
+        """The description, with the coefficients that were set by hand, and with the caution of the file."""
+        caution = f". Caution: {self.caution}" if self.caution else ""
+        return f"{self.description}{self._by_hand(' (', ')')}{caution}"
 
     def _by_hand(self, before: str, after: str = "") -> str:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
@@ -278,6 +284,43 @@ class Vehicle:
             words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
         found = {axis: words.get(axis, "not identified") for axis in self.layout.by_name}
         return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
+
+    @property
+    def unknown_lags(self) -> list[str]:
+        """A sentence for each lag of thrusters that is not known, on which gains and fast motions rest: no test tells
+        it, or its 95 % interval is wider than the lag."""
+        sentences = []
+        for curve in (curve for curve in self.layout.curves if curve.has_lag):
+            lag, basis = self[curve.coefficient("T")], self.basis.get(curve.coefficient("T"), Basis(""))
+            if basis.source == UNDETERMINED or (basis.interval and basis.interval[1] > 2.0 * lag):
+                ends = " ({:.2g} to {:.2g} s)".format(*basis.interval) if basis.interval else ""
+                sentences.append(f"the lag of {curve.name} thrust is not known{ends}, and {lag:.2g} s is assumed")
+        return sentences
+
+    @property
+    def tested_commands(self) -> str:
+        """The commands between which each axis was tested, in words; nothing if the file does not tell them."""
+        return listed(f"{name} from {low:.0%} to {high:.0%}" for name, (low, high) in self.tested.items())
+
+    @property
+    def doubts(self) -> list[str]:
+        """A sentence for what its own file says against the vehicle: axes whose verdict is neither good nor usable,
+        and lags that no test tells."""
+        made = self.provenance
+        if not (made and made.words and (unfit := self.unfit_axes)):
+            return self.unknown_lags
+        page = made.report.name if made.report else "[provenance] of the vehicle file"
+        return [f"not every axis may be trusted ({', '.join(unfit)}), and {page} has the reasons", *self.unknown_lags]
+
+    @property
+    def caution(self) -> str:
+        """The doubts, and the commands beyond which no test went, in one line, which is told wherever the vehicle goes.
+
+        It is empty for a vehicle whose file says nothing of this kind, such as a published one.
+        """
+        is_narrow = any(low > -1.0 or high < 1.0 for low, high in self.tested.values())
+        tested = [f"tests had commands of {self.tested_commands}, and none beyond"] if is_narrow else []
+        return "; ".join([*self.doubts, *tested])
 
     @property
     def unidentified(self) -> list[Axis]:
@@ -555,4 +598,11 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
         limits=validity.limits,
         provenance=file.provenance,
     )
+    warn_of(vehicle, one_line(str(path)))
     return replace(vehicle, file=VehicleFile(path, content, vehicle))
+
+
+def warn_of(vehicle: Vehicle, name: str) -> None:
+    """Warn of a vehicle that is loaded for use, if its own file has doubts about it."""
+    if vehicle.doubts:
+        warnings.warn(f"{name}: {vehicle.caution}", VehicleWarning, stacklevel=4)

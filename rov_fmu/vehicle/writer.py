@@ -21,7 +21,7 @@ from rov_fmu.io.toml_file import LARGEST, key_line, toml_text
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead, why_no_identifier
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, VehicleWarning, load_vehicle
 
 _DEPTHS = {"curves": 2, "axes": 2, "alternatives": 2, "provenance": 2, "validity": 2}
 """How deep the tables in some tables of a file are written with headings; in the others, one deep. Those inside are
@@ -298,7 +298,8 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
         except VehicleFileError as error:
             raise VehicleFileError(named(error)) from error
         for warning in told:
-            warnings.warn(named(warning.message), warning.category, stacklevel=2)
+            if warning.category is not VehicleWarning:  # it is written, and not used
+                warnings.warn(named(warning.message), warning.category, stacklevel=2)
 
     try:
         return Output(path, (sealed(text) if text == without_seal(text) else text).encode(), check)

@@ -139,7 +139,9 @@ def test_an_axis_without_what_the_rule_needs_is_left_out_with_a_sentence(name: s
     """A parameter that is not in the file keeps what its owner has set."""
     vehicle, sentences = SENTENCES[name]
     found = tuned(vehicle())
-    assert [*found.notes[:-1]] == [f"{axis}: {words}" for axis, words in sentences.items()]
+    assert [note for note in found.notes[:-1] if note != found.vehicle.caution] == [
+        f"{axis}: {words}" for axis, words in sentences.items()
+    ]
     named = {axis.name for axis, of in ROWS.items() if any(of in name for name in found.gains)}
     assert named == {"heave", "yaw"} - sentences.keys()
 

@@ -23,8 +23,8 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """Return the only line about wrong input."""
     assert main(["export", *arguments]) == 2
     error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    return error.removeprefix("rov-fmu: ").rstrip()
+    (line,) = (line for line in error.splitlines() if "not every axis may be trusted" not in line)
+    return line.removeprefix("rov-fmu: ")
 
 
 @pytest.mark.parametrize(

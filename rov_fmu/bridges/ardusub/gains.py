@@ -25,7 +25,6 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.autopilot.ardusub import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
-from rov_fmu.autopilot.gains import unknown_lags
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
 from rov_fmu.io.reading import read_text
@@ -108,6 +107,7 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     usual, owner = read_gains(given) if given else (FIRMWARE, "")
     whose = f"has the gains of {owner}; " if owner not in ("", vehicle.identifier) else ""
     notes = [f"{given}: {whose}the vehicle is {vehicle.identifier}"] if whose else []
+    notes += [vehicle.caution] if vehicle.caution else []
     why = dict.fromkeys(axes, "as given") if given else {axis: _refusal(vehicle, mixer, axis) for axis in axes}
     shares = dict.fromkeys(axes, 1.0)
     push = mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0
@@ -140,7 +140,6 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
             if shares[axis] < _LEAST:
                 why[axis] = f"with {_LEAST:.0%} of the rule's gains, {words}"
     if not given:
-        notes += unknown_lags(vehicle)
         notes += [f"{axis.name}: left out, so that it keeps its gains: {words}" for axis, words in why.items() if words]
     notes += [
         f"{axis.name}: the gains are {share:.0%} of the rule's, so that nothing chatters and all is stable"

@@ -54,6 +54,7 @@ def gains_yaml(vehicle: Vehicle) -> Mapping[str, str]:
         f"# The gains of a cascade for {vehicle.identifier}: {one_line(vehicle.name)}. SI units.",
         "# v* = sat(k_x (x* - x), v_max), braked so that the aim is reached with the deceleration brake;",
         "# tau = k_p (v* - v) + k_i int(v* - v) dt + linear v* + quadratic |v*| v* + inertia dv*/dt + bias.",
+        *([f"# Caution: {one_line(vehicle.caution)}."] if vehicle.caution else []),
         f"step: {made.step:g}  # s, of the controller",
         f"delay: {made.delay:g}  # s, from the sensors to the thrust",
         "axes:",

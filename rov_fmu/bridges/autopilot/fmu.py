@@ -116,6 +116,7 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     names = {axis.name: autopilot.lags[axis.name] for axis in autopilot.axes}
     told = ", ".join(f"{name} {lag:.3g} s" for name, lag in names.items())
     summary = f"Autopilot of {vehicle.name}: holds {', '.join(names)} by its thrusters"
+    summary += f". Caution: {vehicle.caution}" if vehicle.caution else ""
     card = (
         f"What it is\n- {summary}.\n- For each axis: {_MODES}. It samples once per step.\n"
         f"Where it holds\n- The gains are for a step of {autopilot.step:g} s, {autopilot.delay:g} s from sensor to "

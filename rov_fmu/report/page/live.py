@@ -169,11 +169,18 @@ def fly_page(
         vehicle=vehicle,
         layout=vehicle.layout,
         live=live(flown, recording),
-        beyond=[*beyond_stated(vehicle)],
+        beyond=[*_cautions(flown), *beyond_stated(vehicle)],
         compact=compact,
         recording=recording,
         strongest=max(commands, default=0.0),
     )
+
+
+def _cautions(flown: Sequence[FlyingVehicle]) -> Iterator[str]:
+    """Yield what the files of the vehicles say against their use, each in a line that names the vehicle."""
+    for name, one in zip(_names(flown), flown, strict=True):
+        if one.vehicle.caution:
+            yield f"Caution, {name}: {one.vehicle.caution}."
 
 
 def _data(flown: FlyingVehicle) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 import rov_fmu
 from rov_fmu.autopilot.flights import Flights
-from rov_fmu.autopilot.gains import Autopilot, autopilot_of, unknown_lags
+from rov_fmu.autopilot.gains import Autopilot, autopilot_of
 from rov_fmu.autopilot.law import AXES, PLACE, RATE, SENSORS, STICK
 from rov_fmu.autopilot.pilot import Pilot
 from rov_fmu.bridges.autopilot.files import flown
@@ -242,16 +242,17 @@ def test_the_fmu_has_all_platforms(tmp_path: Path) -> None:
     [
         (
             Basis("Identified", (0.001, 0.113)),
-            ["the lag of t200 thrust is not known (0.001 to 0.11 s), and the gains are for 0.02 s"],
+            ["the lag of t200 thrust is not known (0.001 to 0.11 s), and 0.02 s is assumed"],
         ),
-        (Basis(UNDETERMINED), ["the lag of t200 thrust is not known, and the gains are for 0.02 s"]),
+        (Basis(UNDETERMINED), ["the lag of t200 thrust is not known, and 0.02 s is assumed"]),
         (Basis("Identified", (0.015, 0.03)), []),
         (Basis("Wu (2018)"), []),
     ],
 )
 def test_a_lag_that_is_not_known_is_told(basis: Basis, told: list[str]) -> None:
     coefficients = {**HEAVY.coefficients, "T_t200": 0.02}
-    assert [*unknown_lags(replace(HEAVY, coefficients=coefficients, basis={**HEAVY.basis, "T_t200": basis}))] == told
+    vehicle = replace(HEAVY, coefficients=coefficients, basis={**HEAVY.basis, "T_t200": basis})
+    assert vehicle.unknown_lags == told
 
 
 def test_the_gains_are_a_table_for_any_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
