@@ -2,7 +2,11 @@
  * variables; the tables of the thrusters are constants (model.h). It samples at the start of a step, and its commands are there at the end. */
 #include "autopilot.c"
 
-enum { MOST_PIECES = 2, N_STATE = sizeof(loop_state) / sizeof(double), N_GAINS = sizeof(loop_gains) / sizeof(double) };
+#ifndef MOST_PIECES
+#define MOST_PIECES 2
+#endif
+
+enum { N_STATE = sizeof(loop_state) / sizeof(double), N_GAINS = sizeof(loop_gains) / sizeof(double) };
 
 typedef struct {
     loop_gains gains[AXES];
@@ -101,7 +105,8 @@ static void angles_of(const double at[], double angle[3])
 
 static int delayed_step(double at[], const model_numbers *n, delay_line *line, double t, double h, double next[], double *heading)
 {
-    double values[sizeof(sensor_values) / sizeof(double)], mode[AXES], aim[AXES], demand[AXES], outputs[MOST_THRUSTERS];
+    double values[sizeof(sensor_values) / sizeof(double)], mode[AXES], aim[AXES], demand[AXES];
+    double commands[MOST_THRUSTERS], outputs[MOST_THRUSTERS];
     loop_state state[AXES];
     sensor_values now;
     (void)line, (void)t, (void)heading;
@@ -118,13 +123,16 @@ static int delayed_step(double at[], const model_numbers *n, delay_line *line, d
             memcpy(&state[a], at + STATE_AT[a], sizeof state[a]);
         }
     }
-    autopilot_step(n->gains, (const sharing *)(const void *)SHARING, state, &now, mode, aim, 1.0 - fmin(fmax(at[SAG_AT], 0.0), 1.0), h,
-                   at + FIRST_COMMAND, demand, outputs);
+    autopilot_step(n->gains, (const sharing *)(const void *)SHARING, state, &now, mode, aim, 1.0 - at[SAG_AT], h, commands, demand, outputs);
+    if (!all_finite(commands, N_OUTPUTS) || !all_finite((const double *)state, AXES * N_STATE)) {
+        return 0; /* sensors beyond all measure: nothing of this is kept */
+    }
+    memcpy(at + FIRST_COMMAND, commands, N_OUTPUTS * sizeof commands[0]);
     for (int a = 0; a < AXES; a++) {
         if (STATE_AT[a] >= 0) {
             memcpy(at + STATE_AT[a], &state[a], sizeof state[a]);
         }
     }
     next[0] = at[FIRST_STATE] + h;
-    return all_finite(at + FIRST_COMMAND, N_OUTPUTS) ? 1 : 0;
+    return 1;
 }

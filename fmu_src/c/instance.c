@@ -206,11 +206,27 @@ static bool may_set(const fmu *f, unsigned place)
     return false;
 }
 
+/* Return true when a command is a pulse width of 0: there is no signal. A command that is a fraction may be 0. */
+static bool is_no_signal(unsigned place, double value)
+{
+    return place < N_COMMANDS && value == 0.0 && VARIABLES[place].minimum > 0.0;
+}
+
+/* Return the value that a variable gets: that of an input is held to its range here, so that no model has to. */
+static double held(unsigned place, double value)
+{
+    const variable_info *const info = &VARIABLES[place];
+    if (info->kind != INPUT || is_no_signal(place, value)) {
+        return value;
+    }
+    return value < info->minimum ? info->minimum : value > info->maximum ? info->maximum : value;
+}
+
 /* Return true when a value is the one that a variable has already. Importers set parameters and start values again. */
 static bool is_repeated(const fmu *f, unsigned place, double value)
 {
     const variable_kind kind = VARIABLES[place].kind;
-    return kind != CALCULATED && kind != MEMORY && value == f->now.values[place];
+    return kind != CALCULATED && kind != MEMORY && held(place, value) == f->now.values[place];
 }
 
 /* Return true when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts
@@ -231,12 +247,6 @@ static void replace_guess(fmu *f, const unsigned vr[], size_t n, const double va
                       "the start. Logged once.", VARIABLES[place].name, value[i], f->now.values[place]);
         }
     }
-}
-
-/* Return true when a command is a pulse width of 0: there is no signal. A command that is a fraction may be 0. */
-static bool is_no_signal(unsigned place, double value)
-{
-    return place < N_COMMANDS && value == 0.0 && VARIABLES[place].minimum > 0.0;
 }
 
 /* Warn about a voltage for each curve whose tables do not reach it. */
@@ -314,7 +324,7 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
                       mode_name(f->now.mode));
             continue;
         }
-        f->now.values[place] = value[i];
+        f->now.values[place] = held(place, value[i]);
         if (is_discrete(place) && f->now.mode == CONTINUOUS) {
             WARN_ONCE(f, COMMANDED_BETWEEN_EVENTS, "%s is set, although the standard requires Event Mode for this; it is sent "
                       "when the integrator completes its step. Logged once.", info->name);
@@ -323,9 +333,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
             WARN_ONCE(f, NO_SIGNAL, "%s = 0 means that there is no signal: it acts as neutral; logged once.", info->name);
         } else if (place == VOLTAGE) {
             check_voltage(f, value[i]);
-        } else if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
-            WARN_ONCE(f, place, "%s = %.15g saturates at %g; logged once.", info->name, value[i],
-                      value[i] < info->minimum ? info->minimum : info->maximum);
+        } else if (info->kind == INPUT && f->now.values[place] != value[i]) {
+            WARN_ONCE(f, place, "%s = %.15g saturates at %g; logged once.", info->name, value[i], f->now.values[place]);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
             WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, although the standard requires Event Mode for this; logged once.",
                       info->name);

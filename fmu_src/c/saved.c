@@ -109,7 +109,7 @@ static outcome check_mode_of(fmu *f, const fmu_state *s)
     return DONE;
 }
 
-/* Return true when all numbers of a state are finite, its time is set, and its parameters are within their bounds. */
+/* Return true when all numbers of a state are finite, its time is set, and its parameters and inputs are within their bounds. */
 static bool is_valid(const fmu_state *s)
 {
     bool valid = isfinite(s->time) && !isnan(s->stop) && isfinite(s->heading)
@@ -117,7 +117,7 @@ static bool is_valid(const fmu_state *s)
     for (size_t i = 0; i < N_VARIABLES; i++) {
         const double value = s->values[i];
         const bool bounded = VARIABLES[i].kind == FIXED || VARIABLES[i].kind == TUNABLE;
-        valid = valid && isfinite(value)
+        valid = valid && isfinite(value) && held((unsigned)i, value) == value
                 && (!bounded || (value >= VARIABLES[i].minimum && value <= VARIABLES[i].maximum));
     }
     return valid;

@@ -3,14 +3,13 @@
 import re
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import pytest
 
-from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import read_toml
-from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import spread
 from verification.fuzzing import __main__ as command
 from verification.fuzzing.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
@@ -40,10 +39,12 @@ MISSING = {
 }
 
 
-@pytest.mark.parametrize("fmi", spread([2, 3], (), [3]))
-def test_the_corpus_reaches_every_function(tmp_path: Path, corpus: Path, fmi: int) -> None:
-    """And finds nothing. `python -m verification.fuzzing` begins with the corpus, for every vehicle."""
-    build_target(_sources("videoray", fmi), tmp_path / "target", fmi)
+@pytest.mark.parametrize(
+    ("name", "fmi"), [*product(["videoray"], spread([2, 3], (), [3])), *product(["videoray_autopilot"], [2, 3])]
+)
+def test_the_corpus_reaches_every_function(tmp_path: Path, corpus: Path, name: str, fmi: int) -> None:
+    """And finds nothing. `python -m verification.fuzzing` begins with the corpus, for every vehicle and autopilot."""
+    build_target(_sources(name, fmi), tmp_path / "target", fmi)
     counts = replay(tmp_path / "target", [corpus], tmp_path)
     # FMI 3.0 has one more kind of instances.
     legal = {name for kind in range(fmi) for name in legal_modes(kind, fmi)}
@@ -71,7 +72,7 @@ class Planted:
 
 @cache
 def _sources(vehicle: str, fmi: int) -> dict[str, str]:
-    return dict(native_content(load_vehicle(command.VEHICLES[vehicle]), fmi=fmi).sources)
+    return command.sources_of(vehicle, fmi)
 
 
 _FILE = Path(__file__).with_name("planted.toml")

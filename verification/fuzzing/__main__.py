@@ -14,6 +14,8 @@ from pathlib import Path
 
 import click
 
+from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.bridges.autopilot.fmu import autopilot_model
 from rov_fmu.c.compile import BuildError
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
@@ -36,6 +38,8 @@ VEHICLES = {
 }
 """The vehicles: one with six axes, lag, reverse thrust and dead band; the default; one with all that thrust can depend
 on; and the smallest possible one."""
+AUTOPILOTS = {f"{name}_autopilot": VEHICLES[name] for name in ("bluerov2_heavy", "videoray")}
+"""The autopilots, with their vehicles: one that holds all six axes, and one without roll and pitch."""
 
 EVERY = {"bluerov2_heavy": 20, "thrust": 4}
 """The vehicles that begin with every n-th input of the corpus, because their steps are slow under the sanitizers."""
@@ -55,7 +59,9 @@ def _positive(text: str) -> int:
 @click.option(
     "--jobs", type=_positive, metavar="N", default=cpu_count() or 1, help="Processes (default: one a processor)."
 )
-@click.option("--vehicle", "chosen", type=click.Choice(list(VEHICLES)), help="Only this one (default: all in turn).")
+@click.option(
+    "--vehicle", "chosen", type=click.Choice([*VEHICLES, *AUTOPILOTS]), help="Only this one (default: all in turn)."
+)
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="Only this version of FMI (default: both in turn).")
 @click.option("--logs", type=_positive, metavar="N", help="Read N damaged copies of each of INPUTS, logs or tables.")
 @click.option("--keep", is_flag=True, help="Put what led to new places into the corpus.")
@@ -81,7 +87,7 @@ def _command(
         return
     with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
         corpus = Path(name) / "corpus"
-        pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
+        pairs = product([chosen] if chosen else [*VEHICLES, *AUTOPILOTS], [int(fmi)] if fmi else (2, 3))
         targets = {(vehicle, version): Path(name) / f"{vehicle}{version}" for vehicle, version in pairs}
         with ThreadPoolExecutor(jobs) as pool:  # each thread waits for a compiler
             list(pool.map(_build, targets, targets.values()))
@@ -128,8 +134,14 @@ def _try_logs(inputs: Sequence[Path], count: int) -> None:
 
 def _build(pair: tuple[str, int], target: Path) -> None:
     vehicle, version = pair
-    deep = without_surface(load_vehicle(VEHICLES[vehicle]))  # the laws are those of a vehicle under water
-    build_target(native_content(deep, fmi=version).sources, target, version)
+    build_target(sources_of(vehicle, version), target, version)
+
+
+def sources_of(name: str, fmi: int) -> dict[str, str]:
+    """Return the C of the FMU of a vehicle or of an autopilot, which then has Model Exchange, too."""
+    deep = without_surface(load_vehicle((VEHICLES | AUTOPILOTS)[name]))  # the laws are those of a vehicle under water
+    subject = autopilot_model(autopilot_of(deep)) if name in AUTOPILOTS else deep
+    return dict(native_content(subject, fmi=fmi).sources)
 
 
 def _keep(command: str, found: Path) -> str:

@@ -208,7 +208,7 @@ static bool settable(const slot *s, unsigned place)
 static bool is_repetition(const slot *s, unsigned place, double value)
 {
     const variable_kind kind = VARIABLES[place].kind;
-    return s->f != NULL && kind != CALCULATED && kind != MEMORY && value == s->f->now.values[place];
+    return s->f != NULL && kind != CALCULATED && kind != MEMORY && held(place, value) == s->f->now.values[place];
 }
 
 static void PLAY(SetReal)(slot *s)
@@ -231,7 +231,8 @@ static void PLAY(SetReal)(slot *s)
             for (size_t j = i + 1; j < n; j++) {
                 other = other || vr[j] == vr[i];
             }
-            PROPERTY(other || memcmp(&s->f->now.values[place], &values[i], sizeof(double)) == 0, "not set");
+            const double value = held(place, values[i]); /* check_instance knows the ranges */
+            PROPERTY(other || memcmp(&s->f->now.values[place], &value, sizeof value) == 0, "not set");
         }
     }
 }

@@ -4,6 +4,9 @@
 
 #include "world.h"
 
+#ifdef IS_AUTOPILOT
+#include "laws_of_autopilot.h"
+#else
 static const double TURN = 6.283185307179586;
 
 /* Velocities (m/s, rad/s) below this have fewer digits, because squares underflow where the step tests convergence. */
@@ -385,7 +388,10 @@ static void check_first_derivative(fmu *f, unsigned state, double derivative)
              VARIABLES[FIRST_STATE + state].name, derivative, rate);
 }
 
-/* Check the numbers and the mode of an instance, and that its states and thrusts can be read and are finite. */
+#endif
+
+/* Check the numbers and the mode of an instance, that its inputs are within their ranges, and that its states and thrusts can be
+ * read and are finite. */
 static void check_instance(const slot *s)
 {
     enum { ADDED = N_STATES + N_OTHER, ALL = ADDED + N_ADDED };
@@ -402,6 +408,11 @@ static void check_instance(const slot *s)
     PROPERTY(memcmp(&numbers, &s->f->numbers, sizeof numbers) == 0, "the numbers are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
+    for (unsigned i = 0; i < N_INPUTS; i++) {
+        const double value = s->f->now.values[i];
+        const bool is_silent = i < N_COMMANDS && value == 0.0; /* a pulse of 0 means that there is no signal */
+        PROPERTY(is_silent || (value >= VARIABLES[i].minimum && value <= VARIABLES[i].maximum), "%s = %g", VARIABLES[i].name, value);
+    }
     const unsigned n = is_moderate(s->f) ? ALL : MAY_OVERFLOW ? N_STATES : ADDED; /* others may overflow */
     before_call();
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");

@@ -20,6 +20,12 @@ static void *calloc_or_not(size_t count, size_t size)
 #include "legal.h"
 #include "versions.h"
 
+#ifndef HAS_LAG /* an autopilot, which has no motion */
+#define IS_AUTOPILOT
+#define HAS_LAG 0
+enum { N_OTHER = 0, N_MEMORY = 0, N_ADDED = 0, FIRST_OTHER = FIRST_COMMAND, FIRST_COEFFICIENT = FIRST_COMMAND, FIRST_ADDED = N_VARIABLES };
+#endif
+
 #define WHICH(name) PASTE(CALL_, FMI(name))
 #define PLAY(name) PASTE(call_, FMI(name))
 
