@@ -5,6 +5,9 @@ const MOST_KEPT = 20000;
 const RESTING = 0.55; // of the vehicle's size: the height of its middle above the seabed on which it rests
 const SHALLOW = 0.02; // m; a vehicle that bobs at the surface is not deeper
 const NO_SURFACE = 1e30; // m; over such a height, nothing of buoyancy and thrust fades out
+const PIECE = 10; // s after which the prediction of a recording begins anew, as that of a report does
+const NEAR_SURFACE = 0.25; // m of depth, within which a vehicle without commands rests at the surface; above, it is in air
+const STEADY = [2, 0.1]; // s, m: while a vehicle rests, its depth stays so long within so little
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
 /** Returns the last place at which ascending numbers are at most x, or 0. @param {number[]} numbers @param {number} x */
@@ -408,13 +411,17 @@ class Replay {
       (one, other) => one - other,
     );
     const next = signals.map(() => 0);
-    let row = 0;
+    let [row, pieces] = [0, 1];
     for (const stop of stops) {
       while (flight.time < stop) {
         const step = Math.min(LONGEST_STEP, stop - flight.time);
         this.move(ghost, flight.time, step);
         if (!pilot.step(flight.time, step, null)) return false;
         flight.time = step < LONGEST_STEP ? stop : flight.time + step;
+        if (flight.time >= PIECE * pieces || this.rests(flight.time, pilot)) {
+          this.beginAnew(pilot, flight.time);
+          pieces = Math.floor(flight.time / PIECE) + 1;
+        }
         if (flight.time - flight.times[flight.times.length - 1] >= stops[stops.length - 1] / MOST_KEPT) flight.keep();
       }
       signals.forEach((signal, n) => {
@@ -428,6 +435,42 @@ class Replay {
       }
     }
     return true;
+  }
+
+  /** Returns the rate of a signal at a time, over a quarter of a second to either side. @param {Signal} signal @param {number} time */
+  rate({ times, values }, time) {
+    const [from, to] = [Math.max(times[0], time - 0.25), Math.min(times[times.length - 1], time + 0.25)];
+    const [one, other] = [from, to].map((t) => between(times, (k) => values[k], t));
+    return to > from ? (other - one) / (to - from) : 0;
+  }
+
+  /** Returns true while the vehicle was on a deck, or at the surface without commands, of which the equation knows nothing.
+   * @param {number} time @param {Craft} pilot */
+  rests(time, { model }) {
+    const { axes } = model.vehicle;
+    const depth = this.recording.signals.find(({ axis, isPosition }) => isPosition && axes[axis].name === "heave");
+    if (!depth) return false;
+    const [long, little] = STEADY;
+    const at = (/** @type {number} */ t) => between(depth.times, (k) => depth.values[k], t);
+    const z = at(time);
+    const isSteady = [-long, long].some((end) => {
+      const isMeasured = time + end >= depth.times[0] && time + end <= depth.times[depth.times.length - 1];
+      return isMeasured && [0.25, 0.5, 0.75, 1].every((share) => Math.abs(at(time + share * end) - z) < little);
+    });
+    if (!isSteady) return false;
+    const isIdle = Object.keys(this.recording.commands).every((name) => Math.abs(model.get(name)) < REST);
+    return z < -NEAR_SURFACE || (z < NEAR_SURFACE && isIdle);
+  }
+
+  /** Puts the pilot's vehicle where it was measured, with the velocity that was measured. @param {Craft} pilot @param {number} time */
+  beginAnew(pilot, time) {
+    for (const signal of this.recording.signals) {
+      const { axis, isPosition, times, values } = signal;
+      pilot.put(axis, isPosition, between(times, (k) => values[k], time));
+      if (isPosition) pilot.put(axis, false, this.rate(signal, time));
+    }
+    pilot.model.turn();
+    pilot.model.observe();
   }
 
   /** Moves the ghost from a time on along the measured motion. @param {Craft} ghost @param {number} time @param {number} h */
@@ -456,7 +499,7 @@ class Replay {
       return `${own.name} ${error.toPrecision(2)} ${unitOf(own, isPosition)}`;
     });
     const left = this.recording.left;
-    return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
+    return `The end of the recording. The prediction, which begins anew every ${PIECE} s, is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
   }
 }
 

@@ -308,7 +308,7 @@ def a_recording(inputs: Mapping[str, float] = COMMANDS) -> str:
     time, rng = 0.1 * np.arange(200), np.random.default_rng(3)
     columns = {title: most * rng.uniform(-1.0, 1.0, 8).repeat(25) for title, most in inputs.items()}
     given = {title.split()[0]: values / (100.0 if "%" in title else 1.0) for title, values in columns.items()}
-    run = load("videoray").simulate(time, given)
+    run = load("videoray").simulate(time, given, start={"z": 9.0})
     heading = (np.degrees(run["psi"]) + 180.0) % 360.0 - 180.0
     rows = zip(time, *columns.values(), run["u"], run["z"], heading, strict=True)
     titles = ["time [s]", *columns, "surge velocity [m/s]", "depth [m]", "heading [deg]"]
@@ -332,7 +332,9 @@ def test_a_recording_is_taken_where_it_is_dropped_and_flies_beside_its_predictio
     assert page.evaluate(outline) == "none"
     page.evaluate("live.speed = 20")
     until(page, "live.paused")
-    assert max(deviations(page)) < 1e-8, "the recording is that of the model"
+    first = page.evaluate("live.flight.replay.errors.map((list) => Math.max(...list.slice(0, 100).map(Math.abs)))")
+    assert max(first) < 1e-8, "the recording is that of the model"
+    assert max(deviations(page)) < 10.0, "the velocity at its second begin is that of the measured way, m, m/s, degrees"
     assert page.is_checked("#live-ghost")
     page.locator("input[name=u_t]").fill("0.5")
     until(page, "live.flight.pilot.model.get('u_t') === 0.5")
