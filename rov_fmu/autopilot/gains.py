@@ -36,7 +36,7 @@ _BRAKE, _SPEED = 0.3, 0.6
 """The parts of the largest force that brake before the aim, and that the drag at the largest rate takes."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Autopilot:
     """The numbers of the autopilot of a vehicle."""
 
@@ -52,6 +52,14 @@ class Autopilot:
     sharing: Sharing
     lags: dict[str, float]
     """The lag of the thrusters of each axis, with the dead time, s."""
+
+    def __repr__(self) -> str:
+        """Return a line for each axis with its gains, and not the tables of the thrusters."""
+        names = ("k_x", "k_p", "k_i", "v_max", "most")
+        rows = [[f"{name} = {self.gain(axis, name):.4g}" for name in names] for axis in self.axes]
+        lines = [f"{axis.name}: {', '.join(row)}" for axis, row in zip(self.axes, rows, strict=True)]
+        head = f"Autopilot of {self.vehicle.identifier}, for a step of {self.step:g} s and a delay of {self.delay:g} s"
+        return "\n".join([head, *lines])
 
     def gain(self, axis: Axis, name: str) -> float:
         """Return a number of an axis."""

@@ -11,6 +11,7 @@ from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
 from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
+from rov_fmu.autopilot.pilot import PLACES
 from rov_fmu.build import model_fmu
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
@@ -63,14 +64,14 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         add(name, declared[name], "input", "continuous", start=float(name == QUATERNION[0]))
     aims = {axis: [-1] * 4 for axis in AXES}
     for axis in autopilot.axes:
-        place = _place_of(axis)
+        place, load = _place_of(axis), "torque" if axis.is_rotation else "force"
         aims[axis] = [
             put(f"mode_{axis.velocity}", f"Mode of {axis.name}. {_MODES}", "1", 2.0 * (axis in (ROLL, PITCH)),
                 display_unit=None, minimum=0.0, maximum=2.0),
-            put(f"stick_{axis.velocity}", f"Share of the largest {axis.load} of {axis.name}", "1", 0.0,
+            put(f"stick_{axis.velocity}", f"Share of the largest {load} in {axis.name}", "1", 0.0,
                 minimum=-1.0, maximum=1.0),
             put(f"ref_{axis.velocity}", f"Rate to hold in {axis.name}", axis.unit, 0.0),
-            put(f"ref_{place}", f"Place or angle to hold in {axis.name}", _length(axis), 0.0),
+            put(f"ref_{place}", _held(axis), _length(axis), 0.0),
         ]  # fmt: skip
     most = {"minimum": 0.0, "maximum": 1.0}
     sag = put("sag", "Part of the largest command that is lost, as by a battery", "1", 0.0, **most)
@@ -128,7 +129,15 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         terminals_document(_terminals(layout, sensors)),
         {**files, "series.c": "/* The autopilot has no series. */\n"},
         has_derivatives=False,
+        experiment=(10.0, autopilot.step),
     )
+
+
+def _held(axis: Axis) -> str:
+    """Return what is held of an axis in mode 2. North and east need surge and sway alike, because the vehicle turns."""
+    name = next(name for name, one in PLACES.items() if one is axis)
+    both = "; needs mode 2 of surge and of sway" if name in ("north", "east") else ""
+    return f"{name.capitalize()} to hold{both}"
 
 
 def _place_of(axis: Axis) -> str:

@@ -13,6 +13,14 @@ _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "factor", "offset")
 """What makes two units the same. Radians are 1: exporters differ in whether they count them."""
 
 
+_NEEDED = {
+    "battery": ": write [battery] in the vehicle file",
+    "electric": ": write [battery], and electric_current in its [curves], in the vehicle file",
+    "waves": ": write waves = true above the tables of the vehicle file",
+}
+"""What a vehicle file must have for terminals that not every vehicle has."""
+
+
 @dataclass(frozen=True)
 class SystemFmu(Fmu):
     """An FMU for Co-Simulation that is a component of a system."""
@@ -74,7 +82,8 @@ class SystemFmu(Fmu):
     def unknown(self, name: str) -> str:
         """Return the message about a name that the FMU does not have."""
         names = [*self.variables, *self.terminals]
-        return f"the FMU has no variable or terminal {shown(name)}{did_you_mean(name, names, 3)}"
+        needed = _NEEDED.get(name, "") if "body_velocity" in self.terminals else ""  # of a vehicle
+        return f"the FMU has no variable or terminal {shown(name)}{needed or did_you_mean(name, names, 3)}"
 
     def start_value(self, name: str, value: Value) -> Value:
         """Return a start value as the type of a variable has it. Raises ValueError with the reason."""

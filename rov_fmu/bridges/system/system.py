@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_model
-from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, slave_of, timed_rows
+from rov_fmu.bridges.system.companion import Rows, companion, lack, levels_of, slave_of, timed_rows
 from rov_fmu.bridges.system.companions._common import Companion
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,

@@ -11,7 +11,10 @@ The seabed pushes with GROUND for each metre of depth and diameter, and damps as
 MoorDyn's own damping is so large that a node would need some 100 times smaller substeps.
 """
 
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import ceil, hypot, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -98,6 +101,26 @@ Line LineType NodeA NodeB UnstrLen NumSegs Outputs
 1 WaveKin
 --- END ---
 """
+
+
+@contextmanager
+def without_output() -> Iterator[None]:
+    """Keep what MoorDyn prints before it can be told not to out of the importer's output."""
+    try:
+        kept = os.dup(1)
+    except OSError:  # the importer has no output
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        if sys.stdout:
+            sys.stdout.flush()
+        os.dup2(null, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(null)
+        os.close(kept)
 
 
 class Tether(Companion):
@@ -193,9 +216,10 @@ class Tether(Companion):
         with TemporaryDirectory() as folder:
             file = Path(folder, "tether.txt")
             file.write_text(FILE.format(**own, **file_of), encoding="utf-8")
-            self.system = moordyn.Create(str(file))
-            moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
-            moordyn.Init(self.system, ends, [0.0] * 6)
+            with without_output():
+                self.system = moordyn.Create(str(file))
+                moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
+                moordyn.Init(self.system, ends, [0.0] * 6)
         moordyn.ExternalWaveKinInit(self.system)
 
     def _levels(self) -> list[list[float]]:
