@@ -99,7 +99,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             return
         for v, value in pairs:
             if self._may_set(v):
-                self.values[v["name"]] = value
+                is_silent = v["unit"] == "us" and value == 0.0  # a pulse of 0 means that there is no signal
+                self.values[v["name"]] = _limited(v, value) if v["causality"] == "input" and not is_silent else value
                 self._warn_of_input(v, value)
             else:
                 self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
