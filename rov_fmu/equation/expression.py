@@ -63,12 +63,14 @@ class Number(Expression):
 
 @dataclass(frozen=True)
 class Name(Expression):
-    """A quantity: a variable of the FMU, or a quantity of the equation with its kind."""
+    """A quantity: a variable of the FMU, or a quantity of the equation with its kind and its owners."""
 
     identifier: str
     """How the quantity is called in C and Python."""
     kind: str = ""
     """What the quantity is, such as "gain" or "command"; empty for a variable of the FMU."""
+    owners: tuple[str, ...] = ()
+    """Whose quantity it is: the name of a part of the vehicle, or the velocities of axes."""
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -153,7 +155,7 @@ class Names:
         if key not in self._names:
             identifier = unused("_".join(key), self._taken)
             self._taken.add(identifier)
-            self._names[key] = Name(identifier, kind)
+            self._names[key] = Name(identifier, kind, owners)
         return self._names[key]
 
     def of_kind(self, kind: str) -> list[Name]:
@@ -327,8 +329,8 @@ def written(
             return name_of(x)
         case Number(value):
             return language.number(value)
-        case Operation("directed", (_, Name(identifier, kind), _)) if "directed" in language.forms:
-            return name_of(Name(language.forms["directed"].format(identifier), kind))
+        case Operation("directed", (_, Name(identifier, kind, owners), _)) if "directed" in language.forms:
+            return name_of(Name(language.forms["directed"].format(identifier), kind, owners))
     assert isinstance(x, Operation)
     shown = plain(x) if x.op in _CHOICES_BY_NAME and x.op not in language.forms else x
     assert isinstance(shown, Operation)
@@ -393,7 +395,7 @@ def slope_name(table: str) -> str:
 
 def change_of(name: str) -> Name:
     """Return the name of the change of a quantity. No other identifier begins so."""
-    return Name(f"change_of_{name}", "change")
+    return Name(f"change_of_{name}", "change", (name,))
 
 
 def tangent(x: Expression, changes: Mapping[str, Expression]) -> Expression:  # noqa: PLR0911 - a case for each operation
