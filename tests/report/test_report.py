@@ -20,7 +20,7 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
 from rov_fmu.report.templates import today
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import VehicleWarning, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
 from tests.conftest import Made
 from tests.report.conftest import Visit
@@ -182,7 +182,8 @@ def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_fmu_has_the_report(identified: Path) -> None:
     assert 'report = "pages/report.html"' in identified.read_text(encoding="utf-8")
-    vehicle = load_vehicle(identified)
+    with pytest.warns(VehicleWarning, match="yaw: do not use"):
+        vehicle = load_vehicle(identified)
     for content in (native_content(vehicle), python_content(vehicle)):
         report = content.files["documentation/identification.html"]
         assert report == (identified.parent / "pages" / "report.html").read_bytes()
@@ -196,11 +197,12 @@ def test_a_tuned_vehicle_keeps_its_report_where_that_is_inside_its_folder(
     folder = identified.parent
     tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o"]
     assert main([*tune, str(folder / "tuned.toml")]) == 0
-    assert folder / "pages" / "report.html" in load_vehicle(folder / "tuned.toml").files
+    with pytest.warns(VehicleWarning, match="yaw: do not use"):
+        assert folder / "pages" / "report.html" in load_vehicle(folder / "tuned.toml").files
     (folder / "other").mkdir()
     capsys.readouterr()
     assert main([*tune, str(folder / "other" / "tuned.toml")]) == 2
-    (error,) = capsys.readouterr().err.splitlines()
+    _caution, error = capsys.readouterr().err.splitlines()
     assert "provenance.report = 'pages/report.html': must be inside the folder of the new file" in error
     assert not list((folder / "other").iterdir())
 

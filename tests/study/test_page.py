@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from lxml import html
+from scipy.stats import spearmanr
 
 from rov_fmu import Results
 from rov_fmu.cli import main
@@ -45,6 +46,13 @@ def made(folder: Path, fmu: Path, plan: str, code: int = 0) -> Path:
     return folder / "results"
 
 
+def most_with(figure: str, results: Results) -> str:
+    """Return the parameter that varied most with a figure, by Spearman's correlation as SciPy computes it."""
+    runs = results.runs.dropna(subset=[figure])
+    varied = [name for name in results.parameters if runs[name].nunique() > 1]
+    return max(varied, key=lambda name: abs(spearmanr(runs[figure], runs[name]).statistic))
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path]) -> Path:
     """A study of which some runs failed, and the others lack a figure."""
@@ -78,7 +86,8 @@ def test_the_page_is_one_table_and_its_plots(folder: Path) -> None:
         else:
             assert {*cells.values()} == {"–"}
     assert table.xpath("string(//tr[td/code='end']/td/div)") == "y[-1]"
-    assert [svg.get("aria-label") for svg in page.xpath("//svg")] == ["Distribution of end", "Trajectories of y"]
+    shown = [svg.get("aria-label") for svg in page.xpath("//svg")]
+    assert shown == ["Distribution of end", f"end over {most_with('end', results)}", "Trajectories of y"]
 
 
 def test_the_page_gives_each_reason_with_the_first_runs_that_have_it(folder: Path) -> None:
@@ -106,14 +115,14 @@ def test_a_grid_of_one_or_two_variables_has_lines(folder: Path, monkeypatch: pyt
     monkeypatch.setattr("rov_fmu.study.plots.inline_svg", lambda label, *_, **__: shown.append(label))
     results = Results(folder)
     results.plan["sampler"] = "grid"
-    for parameters, label in {
-        ("a",): "end over a",
-        ("mode", "a"): "end over a and mode",
-        ("mode", "b", "a"): "Distribution of end",
+    for parameters, labels in {
+        ("a",): ["end over a"],
+        ("mode", "a"): ["end over a and mode"],
+        ("mode", "b", "a"): ["Distribution of end", f"end over {most_with('end', results)}"],
     }.items():
         results.parameters = parameters
         page = study_page(results)
-        assert shown == [label, "Trajectories of y"]
+        assert shown == [*labels, "Trajectories of y"]
         assert ("A line for each of up to four values of <code>mode</code>" in page) == (len(parameters) == 2)
         assert ("Distributions: share of the runs" in page) == (len(parameters) == 3)
         shown.clear()
