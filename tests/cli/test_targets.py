@@ -12,7 +12,6 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import (
     ALONE,
     COMMANDS,
@@ -182,7 +181,6 @@ BUILT = [
 OVERWRITING = [
     *(f"build {vehicle} -o {output}" for vehicle, output in BUILT),
     "identify tests --force -o tests/rov.toml",
-    "identify tests --force -o tests/other.toml",
     "tune videoray.toml --axis heave --points points.csv -o points.csv",
     "tune effects.toml --axis surge --command 1 --v-ss 1 -o thrust_12_v.csv",
     "simulate effects.toml -o thrust_12_v.csv",
@@ -203,15 +201,13 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reading")
     shutil.copytree(VIDEORAY.parent, folder, dirs_exist_ok=True)
     shutil.copytree(TESTS, folder / "tests")
-    write_vehicle(load_vehicle(VIDEORAY), folder / "tests" / "other.toml")
     shutil.copy(THRUST_EFFECTS, folder / "effects.toml")
     for path in load_vehicle(THRUST_EFFECTS).files:
         shutil.copy(path, folder)
     (folder / "linked.toml").symlink_to("videoray.toml")
     (folder / "hard.toml").hardlink_to(folder / "videoray.toml")
-    rov, refit = ((path).read_text(encoding="utf-8") for path in (TESTS / "rov.toml", REFIT))
+    refit = REFIT.read_text(encoding="utf-8")
     texts = {
-        "tests/rov.toml": rov.replace('"videoray"\n', '"other.toml"\n', 1),
         "refit.toml": refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"'),
         "report.html": "a report",
         "points.csv": "time,command [%],velocity [m/s]\n0,20,0.1\n",
