@@ -2,19 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf
+from math import hypot, inf, log, sqrt
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import REVERSE
+from rov_fmu.equation.catalogue import PITCH, REVERSE, ROLL
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Start, Suspect, in_order, probability, row_of
-from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, SHORTEST_LAG, WIDTH
+from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, SHORTEST_LAG, STRENGTH, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
-from rov_fmu.identify.likelihood.posterior import hull
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
-from rov_fmu.identify.result import CONSTANTS, Estimate, IdentifiedEffect, Logging, SensorNoise, Structure
+from rov_fmu.identify.result import CONSTANTS, Estimate, IdentifiedEffect, Interval, Logging, SensorNoise, Structure
 from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
@@ -28,9 +28,10 @@ def optional_effects(fit: Fit) -> Iterator[IdentifiedEffect]:
 
     That of a hypothesis about the structure, which is no effect of unusual size, is that with which it won.
     """
+    yield from _strengths(fit)
     file, odds = fit.file.posterior, {row_of(fit.objective, one): value for one, value in fit.odds.items()}
     for n, p in enumerate(file.table.parameters):
-        if not p.is_effect:
+        if not p.is_effect or p.kind == STRENGTH:
             continue
         value, interval = _number(fit, n)
         posterior = fit.posterior if n in file.absent else file
@@ -40,6 +41,48 @@ def optional_effects(fit: Fit) -> Iterator[IdentifiedEffect]:
         beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
         evidence, least = odds.get(n, posterior.evidence(n)), _shortest(fit, p)
         yield IdentifiedEffect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
+
+
+def _strengths(fit: Fit) -> Iterator[IdentifiedEffect]:
+    """Yield the force of each thruster relative to that of another one of its type.
+
+    Only such a ratio is told, because how strong all of them are together hardly changes the motion. The other one is
+    the middle one of those that push along the same axes, so that one that is ill has a ratio to a whole one.
+    """
+    table = fit.posterior.table
+    rows = {t.name: n for t in table.layout.thrusters if (n := table.index(STRENGTH, t.name)) is not None}
+    of_type = grouped((table.shared(curve.name), name) for name, curve in table.layout.curve_of.items() if name in rows)
+    for same in of_type.values():
+        groups = list[set[str]]()
+        for axis in (axis for axis in fit.known.fitted if axis not in (ROLL, PITCH)):
+            own = {t.name for t in table.layout.thrusters_along(axis)} & {*same}
+            touched = [group for group in groups if group & own]
+            groups = [*(group for group in groups if not group & own), own.union(*touched)]
+        for group in filter(None, groups):
+            *_, other = sorted(group, key=lambda name: fit.file.posterior.z[rows[name]])[: len(group) // 2 + 1]
+            for name in same:
+                if name in group - {other} and not table.parameters[rows[name]].is_fixed:
+                    yield _strength(fit, name, other, rows[name], rows[other])
+
+
+def _strength(fit: Fit, name: str, other: str, n: int, m: int) -> IdentifiedEffect:
+    """Return the force of a thruster relative to another one, by their covariance. Its evidence is that their
+    difference is not 0."""
+    ratios, ends = list[float](), list[Interval]()
+    for posterior in fit.posteriors:
+        kind, C, one, two = posterior.table.parameters[n].of_kind, posterior.covariance, *posterior.z[[n, m]]
+        ratios.append(float(one / two))
+        errors = [
+            max(sqrt(C[n, n] - 2.0 * r * C[n, m] + r * r * C[m, m]), kind.finest / QUANTILE) for r in (ratios[-1], 1.0)
+        ]
+        low, high = around(ratios[-1], errors[0] / two)
+        ends.append((max(low, 0.0), high))
+    own, of_other = (posterior.table.parameters[k] for k in (n, m))
+    before = hypot(own.deviation, of_other.deviation)
+    evidence = ((one - two) / errors[1]) ** 2 - ((own.mean - of_other.mean) / before) ** 2
+    evidence = float(evidence + 2.0 * log(errors[1] / before))
+    words = f"force relative to that of {other}"
+    return IdentifiedEffect(STRENGTH, name, words, ratios[0], hull(*ends), "1", evidence, beside=other)
 
 
 def _number(fit: Fit, n: int) -> Estimate:

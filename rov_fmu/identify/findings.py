@@ -14,7 +14,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
-from rov_fmu.identify.likelihood.kinds import KINDS
+from rov_fmu.identify.likelihood.kinds import KINDS, PRIORS
 from rov_fmu.identify.result import (
     ALARM,
     DISAGREEMENT,
@@ -71,6 +71,8 @@ STOPPING = (
 _ASIDE = 0.1
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
 which gives it almost a third of its full speed. A symmetric pair leaves less, if its thrust astern is above 80 %."""
+_UNLIKE = PRIORS["thrust"].deviation
+"""Two thrusters of one type that differ by more than this are not both whole."""
 _LEAST_WANDER = 0.005
 """A wander of an estimator's velocity below this one is not told, m/s."""
 _ODD = 3.0
@@ -118,6 +120,9 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
             "moment), and is the likely cause. {coupling}{apart}"
+        ),
+        "weak thruster": (
+            "thruster {of}: it has {share} of the force of {other} ({low} to {high}). Check both for weed and damage"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": (
@@ -174,6 +179,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
     },
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
+        "strength": "thruster {of}: it has {share} of the force of {other} ({low} to {high})",
         "idle voltage": (
             "no effect of the logged voltage ({volts} V) on the thrust is seen, so the vehicle does without it"
         ),
@@ -829,6 +835,13 @@ def _rounded(time: float) -> float:
 
 def _effect(identification: Identification, effect: IdentifiedEffect) -> Iterator[Finding]:
     """Yield the fact about an effect that is kept, after the doubt about one of an unusual size."""
+    if effect.beside:
+        share, low, high = (
+            f"{value:.1%}" if value > 0.9 else f"{value:.0%}" for value in (effect.value, *effect.interval)
+        )
+        kind = "strength" if abs(effect.value - 1.0) < _UNLIKE else "weak thruster"
+        yield about("", kind, of=effect.of, other=effect.beside, share=share, low=low, high=high)
+        return
     of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
     words = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name}
     words["value"] = in_words(effect.value, effect.interval, effect.unit)

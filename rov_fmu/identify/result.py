@@ -66,7 +66,7 @@ CONSTANTS = {
     ),
     "contrast": Constant(
         0.2,
-        "standard error of the health of a thruster by the data alone, up to which a hypothesis is about it",
+        "standard error of the strength of a thruster by the data alone, up to which a hypothesis is about it",
         "0.003 to 0.12 where logs tell thrusters apart, and 0.45 to 4 where their commands are alike",
     ),
     "shared": Constant(
@@ -259,6 +259,8 @@ class IdentifiedEffect:
     """How far it is from the usual size, relative to where it is unusual; 0 for what a single log has."""
     least: float = -inf
     """The smallest value that the sampling shows."""
+    beside: str = ""
+    """The thruster to whose force that of this one is relative."""
 
     @property
     def rounded_evidence(self) -> float:

@@ -151,7 +151,8 @@ OF_FILE = IdentifiedEffect("current", "log_1.csv", "current to the north", -0.1,
 SLOW = IdentifiedEffect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
-HEALTH = Structure("health", "l", 0.999, 0.5)
+STRENGTH = IdentifiedEffect("health", "stbd", "", 0.8, (0.79, 0.81), "1", 40.0, beside="port")
+CAUSE = Structure("curve of its own", "l", 0.999, 0.5)
 LOST = Structure("momentary commands", "a.csv", 1.0, words=(("share", "30%"), ("axis", "yaw"), ("rate", "10")))
 
 
@@ -192,16 +193,16 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         turning("heading", "surge velocity"),
     ),
     (
-        "health",
-        structured(HEALTH),
-        "thruster l: its force is 50% of that of a whole one",
-        structured(HEALTH, value=0.95),
+        "weak thruster",
+        quiet(effects=(STRENGTH,)),
+        "thruster stbd: it has 80% of the force of port (79% to 81%). Check both for weed and damage",
+        quiet(effects=(replace(STRENGTH, value=0.91),)),
     ),
     (
-        "health",
-        structured(HEALTH, value=0.85),
-        "thruster l: its force is 85% of that of a whole one",
-        quiet(),
+        "strength",
+        quiet(effects=(replace(STRENGTH, value=0.971, interval=(0.968, 0.974)),)),
+        "thruster stbd: it has 97.1% of the force of port (96.8% to 97.4%)",
+        quiet(effects=(replace(STRENGTH, value=0.971, evidence=5.0),)),
     ),
     ("coupling", structured(Structure("coupling", "", 0.999, 1.0)), "a motion along one turns or moves", quiet()),
     ("curve of its own", structured(Structure("curve of its own", "l", 0.97, 0.7)), "thruster l: it has a", quiet()),
@@ -227,20 +228,20 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     ("coupling", quiet(structures=(Structure("coupling", "", 0.999),)), "by the Coriolis and Munk forces", quiet()),
-    ("curve of its own", structured(HEALTH, kind="curve of its own"), "with 50% of the thrust astern, rel", quiet()),
-    ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
-    ("voltage drop", structured(HEALTH, kind="voltage drop"), "they lose 50% of their thrust while all have", quiet()),
+    ("curve of its own", structured(CAUSE, kind="curve of its own"), "with 50% of the thrust astern, rel", quiet()),
+    ("command limit", structured(CAUSE, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
+    ("voltage drop", structured(CAUSE, kind="voltage drop"), "they lose 50% of their thrust while all have", quiet()),
     (
         "slew limit",
-        structured(HEALTH, kind="slew limit", value=1.25, unit="s"),
+        structured(CAUSE, kind="slew limit", value=1.25, unit="s"),
         "as ramps, which take 1.2 s from rest to full command",
-        structured(HEALTH, kind="slew limit", value=0.19, unit="s"),
+        structured(CAUSE, kind="slew limit", value=0.19, unit="s"),
     ),
     (
         "turned velocity sensor",
-        structured(HEALTH, kind="turned velocity sensor", value=-1.5708, unit="rad"),
+        structured(CAUSE, kind="turned velocity sensor", value=-1.5708, unit="rad"),
         "the velocity sensor is turned by -90 deg about the vertical axis",
-        structured(HEALTH, kind="turned velocity sensor", value=0.04, unit="rad"),
+        structured(CAUSE, kind="turned velocity sensor", value=0.04, unit="rad"),
     ),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),

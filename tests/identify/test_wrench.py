@@ -127,7 +127,7 @@ def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
 def test_a_force_along_an_axis_is_no_thruster_that_may_be_ill(tmp_path: Path) -> None:
     write_dives(tmp_path, ROV, 1)
     known, logs, _ = begin(load_tests(tmp_path))
-    assert not [*HYPOTHESES["health"].suspects(known, logs)]
+    assert not [*HYPOTHESES["curve of its own"].suspects(known, logs)]
     assert len([*HYPOTHESES["reversed commands"].suspects(known, logs)]) == 2, "but its sign may be wrong"
 
 

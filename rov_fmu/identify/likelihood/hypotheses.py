@@ -16,7 +16,7 @@ from scipy.special import expit
 from rov_fmu.equation.catalogue import COUPLED_AXES, CURVE, REVERSE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import KINDS, LAG, NEUTRAL, OWN_BANDS, OWN_CURVE, OWN_KEYS, PRIORS, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, NEUTRAL, OWN_CURVE, OWN_KEYS, PRIORS, TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
@@ -79,8 +79,6 @@ class Hypothesis:
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
-    frees: tuple[str, ...] = ()
-    """The kinds of other rows that it frees."""
 
 
 # ---- The changes of what the filter reads ----------------------------------------------------------------------------
@@ -400,16 +398,6 @@ HYPOTHESES = {
         changes_thrust=False,
         # no null: a straight line between two rows is not a command that holds, however small the short force is
     ),
-    "health": Hypothesis(
-        0.1,
-        _ill,
-        starts=(0.0, 0.5, 0.75),
-        sentence="thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
-        in_words=_of_twins,
-        least=PRIORS["thrust"].deviation,  # two thrusters of one type differ so
-        ends=(0.0,),  # dead
-        is_contrast=True,
-    ),
     OWN_CURVE: Hypothesis(
         0.002,
         _sharing,
@@ -417,7 +405,6 @@ HYPOTHESES = {
         (-0.4,),
         "thruster {of}: it has a curve of its own, with {value} of the thrust astern, relative to ahead, that others "
         "have{odds}. Check its propeller, its speed controller and the neutral of this",
-        frees=("health", *OWN_BANDS),
         is_contrast=True,
     ),
     NEUTRAL: Hypothesis(
@@ -426,7 +413,6 @@ HYPOTHESES = {
         _differing,
         (0.04, -0.04),
         "thruster {of}: its neutral is off by {value} of full command{odds}. Set the neutral of its speed controller",
-        frees=OWN_BANDS,
         is_contrast=True,
     ),
     "command limit": Hypothesis(
@@ -474,13 +460,8 @@ def applied(plain: Objective, starts: Starts, *, thinned: bool = False) -> Objec
     known, logs = plain.table.known, plain.logs
     for kind, of in in_order(starts):
         known, logs = HYPOTHESES[kind].change(known, logs, of, starts[kind, of])
-    freed = ((row, of[0] if of else "") for kind, of in starts if HYPOTHESES[kind].starts for row in kinds_freed(kind))
+    freed = ((kind, of[0] if of else "") for kind, of in starts if HYPOTHESES[kind].starts)
     return Objective.of_known(replace(known, freed=known.freed.union(freed)), logs, plain.rows, thinned=thinned)
-
-
-def kinds_freed(kind: str) -> frozenset[str]:
-    """Return the kinds of the rows that a hypothesis frees, if it frees any: its own, and those beside it."""
-    return frozenset((kind, *HYPOTHESES[kind].frees))
 
 
 def row_of(objective: Objective, suspect: Suspect) -> int | None:
@@ -496,11 +477,12 @@ def contrasts(plain: Objective, z: Array) -> dict[str, float]:
     of the motion are so wide that they tell nothing. `z` is a point near the fit. A thruster that no log commands, and
     a commanded force along an axis of the body, are not among the result. Raises DivergedError.
     """
-    starts = {("health", of): _WEAK for of in _ill(plain.table.known, plain.logs)}
-    if not starts:
+    ill = [("health", name) for (name,) in _ill(plain.table.known, plain.logs)]
+    if not ill:
         return {}
-    objective = applied(plain, starts, thinned=True)
-    of = {name: n for _, (name,) in starts if (n := objective.table.index("health", name)) is not None}
+    known = replace(plain.table.known, freed=plain.table.known.freed.union(ill))
+    objective = Objective.of_known(known, plain.logs, plain.rows, thinned=True)
+    of = {name: n for kind, name in ill if (n := objective.table.index(kind, name)) is not None}
     z = np.where(objective.table.each("of_motion"), z, objective.mean)
     z[[*of.values()]] = _WEAK
     z = np.clip(z, objective.low, objective.high)

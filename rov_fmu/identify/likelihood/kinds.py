@@ -29,7 +29,7 @@ INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "loggin
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 TURN = "turned velocity sensor"
-OWN_CURVE, NEUTRAL, OWN_BANDS = "curve of its own", "neutral", ("dead band of its own", "dead band of its own astern")
+STRENGTH, OWN_CURVE, NEUTRAL = "health", "curve of its own", "neutral"
 SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
 OWN_KEYS = ("a_t", "b_t", "c_0")
@@ -524,16 +524,20 @@ KINDS = {
         0.3,
         unit="m/s",
     ),
-    "health": _of_structure(
+    STRENGTH: Kind(
+        Deviation(
+            "strength", 0.1, "the force of a thruster relative to its curve", "two thrusters of one type differ so"
+        ),
         "force of the thruster relative to a whole one",
         keys=("health",),
         is_coefficient=True,
+        is_of_structure=True,
         of_thruster=True,
-        mean=0.75,
-        deviation=0.5,
+        mean=1.0,
         low=0.0,
-        high=1.0,
+        high=2.0,
         null=1.0,
+        finest=0.005,
     ),
     OWN_CURVE: _of_structure(
         "thrust of the thruster astern relative to ahead, as a multiple of that of the others",
@@ -542,12 +546,6 @@ KINDS = {
         null=0.0,
         of_thruster=True,
     ),
-    **{
-        kind: _of_structure(
-            f"{kind}, beyond that of the others", deviation=0.1, low=0.0, high=0.4, null=0.0, of_thruster=True
-        )
-        for kind in OWN_BANDS
-    },
     NEUTRAL: _of_structure(
         "command by which the neutral is off: the dead band is so much narrower ahead, and wider astern",
         deviation=0.05,

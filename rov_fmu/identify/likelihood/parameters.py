@@ -23,7 +23,6 @@ from rov_fmu.identify.likelihood.kinds import (
     LEAST_LAG,
     NEUTRAL,
     OFFSET,
-    OWN_BANDS,
     OWN_CURVE,
     PLACED,
     POWER,
@@ -31,6 +30,7 @@ from rov_fmu.identify.likelihood.kinds import (
     PRIORS,
     SENSOR_OFFSET,
     SENSOR_SCALE,
+    STRENGTH,
     TURN,
     WANDER,
     WHITE,
@@ -202,10 +202,7 @@ class Table:
             curve, shared = (self.layout.curves_by_name[one] for one in (name, source))
             factors = {f"{key}{REVERSE}": np.exp(self.get(z, OWN_CURVE, thruster)) for key in ("a_t", "b_t", "d")}
             off = self.get(z, NEUTRAL, thruster)
-            bands = {
-                f"c_0{end}": self.get(z, kind, thruster) + sign * off
-                for end, kind, sign in zip(("", REVERSE), OWN_BANDS, (-1.0, 1.0), strict=True)
-            }
+            bands = {"c_0": -off, f"c_0{REVERSE}": off}
             for key in curve.keys:
                 value = values.get(shared.coefficient(key), 0.0) * factors.get(key, 1.0)
                 values[curve.coefficient(key)] = np.maximum(value + bands[key], 0.0) if key in bands else value
@@ -215,7 +212,7 @@ class Table:
     def _own_curves(self) -> Mapping[str, tuple[str, str]]:
         return self.prior.own_curves if self.prior else {}
 
-    def _shared(self, curve: str) -> str:
+    def shared(self, curve: str) -> str:
         """Return the name of the curve that has the parameters of a curve."""
         return self._own_curves.get(curve, (curve, ""))[0]
 
@@ -322,7 +319,7 @@ class Table:
         axes = layout.bare_axes
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
         for thruster, curve in ((t, c) for t, c in layout.curve_of.items() if not c.has_rotors):
-            units[curve.lagging(thruster)] = self.get(z, "thrust scale", self._shared(curve.name), default=1.0)
+            units[curve.lagging(thruster)] = self.get(z, "thrust scale", self.shared(curve.name), default=1.0)
 
         def slow(kind: str, of: str = "", unit: Any = 1.0) -> Slow:
             process = KINDS[kind].slow
@@ -561,13 +558,23 @@ def _fixed(p: Parameter, z: float = 0.0) -> Parameter:
 
 
 def _of_structure(known: Prior, make: Make) -> Iterator[Parameter]:
-    """Yield what hypotheses about the structure may free. It stays at what is known, or where it changes nothing."""
+    """Yield what hypotheses about the structure may free, which else stays at what is known, or where it changes
+    nothing, and the strength of each thruster that shares a curve."""
     for kind in (kind for kind, one in KINDS.items() if one.is_of_structure):
         for of, name in known.layout.health.items() if KINDS[kind].of_thruster else [("", "")]:
             row = make(kind, of, sets=(name,) if KINDS[kind].is_coefficient else ())
             absent = known.coefficients.get(name, 0.0) if row.sets else row.null or 0.0
             if {*row.sets} <= {*known.layout.coefficients}:
-                yield row if (kind, of) in known.freed else _fixed(row, absent)
+                if kind == STRENGTH and _may_differ(known, of):
+                    yield replace(row, mean=absent)
+                else:
+                    yield row if (kind, of) in known.freed else _fixed(row, absent)
+
+
+def _may_differ(known: Prior, name: str) -> bool:
+    """Return True for a thruster that shares a curve with others. One alone is as strong as its curve says."""
+    types = {of: known.own_curves.get(curve.name, (curve.name,))[0] for of, curve in known.layout.curve_of.items()}
+    return not known.layout.has_wrench and [*types.values()].count(types[name]) > 1
 
 
 def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:

@@ -28,11 +28,10 @@ from rov_fmu.identify.likelihood.hypotheses import (
     apart,
     applied,
     dive_commands,
-    kinds_freed,
     row_of,
     thrusters_alike,
 )
-from rov_fmu.identify.likelihood.kinds import INERTIA, SHORTEST_LAG, WHITE, WIDTH
+from rov_fmu.identify.likelihood.kinds import INERTIA, NEUTRAL, OWN_CURVE, SHORTEST_LAG, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
@@ -721,7 +720,8 @@ class StructureSearch:
             is_alarm = (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
             for some in self._smaller if is_alarm and (kind, of) not in self.refuted else ():
                 excludes = any(
-                    kinds_freed(kind) & kinds_freed(other) and (not of or {*of} & {*own}) for other, own in some
+                    (kind == other or {kind, other} <= {OWN_CURVE, NEUTRAL}) and (not of or {*of} & {*own})
+                    for other, own in some
                 )
                 if len(some) < _MOST and not excludes:
                     sets = [{**some, (kind, of): start} for start in starts]
