@@ -310,6 +310,15 @@ THRUSTER = {
     ),
 }
 """The coefficients of a thruster."""
+GEOMETRY = {
+    "g_u": Declaration("1", "Parts ahead of the directions of the thrusters relative to those given", 0.0, 10.0),
+    "g_v": Declaration("1", "Parts to starboard of the directions of the thrusters relative to those given", 0.0, 10.0),
+    "g_r": Declaration("1", "Places of the thrusters ahead and to starboard relative to those given", 0.0, 10.0),
+    "x_T": Declaration("m", "How far ahead of their places the thrusters are", -10.0, 10.0),
+    "y_T": Declaration("m", "How far to starboard of their places the thrusters are", -10.0, 10.0),
+}
+"""What is uncertain of the thrusters' geometry while a vehicle is identified. A vehicle file has directions and places
+that contain it."""
 POINT = {
     f"r_{axis}": Declaration("m", f"Position of the {{point}}, {where} r_{axis}", -100.0, 100.0, tunable=True)
     for axis, where in _DIRECTIONS

@@ -208,8 +208,22 @@ def thrusts(
     for t in layout.thrusters_along(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
-            parts.append(t.effect(axis) * _with_arm(t, axis, force_of(t.name, own), names))
+            parts.append(_effect(layout, t, axis) * _with_arm(t, axis, force_of(t.name, own), names))
     return parts
+
+
+def _effect(layout: Layout, thruster: Thruster, axis: Axis) -> Expression | float:
+    """Return the part of a thrust along an axis, or its moment about it, which coefficients change whose geometry is
+    uncertain."""
+    if not layout.is_uncertain:
+        return thruster.effect(axis)
+    X, Y, Z = (0.0 if abs(part) < FAINT else part for part in thruster.direction.value)
+    x, y, z = thruster.place
+    force = Name("g_u") * X, Name("g_v") * Y, ONE * Z
+    place = Name("g_r") * x + Name("x_T"), Name("g_r") * y + Name("y_T"), ONE * z
+    if not axis.is_rotation:
+        return force[axis.place]
+    return total(sign * (place[coordinate] * force[direction]) for sign, coordinate, direction in _levers(axis))
 
 
 def _with_arm(thruster: Thruster, axis: Axis, force: Expression, names: Names) -> Expression:
@@ -303,8 +317,9 @@ def advance(
         for other in layout.bare_axes:
             parts = []
             for t in layout.thrusters:
-                effect, own = t.effect(axis) * t.effect(other), layout.curve_of[t.name]
-                if "d" in own.keys and curve in (None, own) and abs(effect) > FAINT:
+                effect, own = _effect(layout, t, axis) * _effect(layout, t, other), layout.curve_of[t.name]
+                is_some = effect != ZERO if isinstance(effect, Expression) else abs(effect) > FAINT
+                if "d" in own.keys and curve in (None, own) and is_some:
                     of_thruster = loss_of(t.name) if loss_of else names("loss", t.name)
                     loss = _with_arm(t, axis, of_thruster, names)
                     parts.append(effect * _with_arm(t, other, loss, names))

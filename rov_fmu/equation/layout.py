@@ -31,6 +31,7 @@ from .catalogue import (
     EARTH,
     ELEVATION,
     FIN,
+    GEOMETRY,
     HEADING,
     HEAVE,
     OUTSIDE,
@@ -63,7 +64,7 @@ from .catalogue import (
     velocity_declaration,
     voltage_declaration,
 )
-from .parts import FAINT, BodyForce, Curve, Fin, Part, Point, Range, SourcedVector, Thruster, VehicleAxis
+from .parts import FAINT, BodyForce, Curve, Fin, Part, Point, Range, SourcedVector, Thruster, VehicleAxis, effect_along
 from .words import (
     actuator_words,
     command_words,
@@ -137,6 +138,8 @@ class Layout:
     water."""
     waves: bool = False
     """True when the acceleration and the elevation of the water are inputs, and the water also moves up and down."""
+    is_uncertain: bool = False
+    """True while a vehicle is identified whose geometry has the coefficients of GEOMETRY."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
@@ -254,8 +257,14 @@ class Layout:
         return [[self.gains[name].get(command, 0.0) for command in self.commands] for name in actuators]
 
     def thrusters_along(self, axis: Axis) -> list[Thruster]:
-        """Return the thrusters that act on an axis."""
-        return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
+        """Return the thrusters that act on an axis, perhaps only because their places are uncertain."""
+
+        def acts(t: Thruster) -> bool:
+            moved = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)) if self.is_uncertain and axis.is_rotation else ()
+            by_places = (effect_along(axis, t.direction.value, place) for place in moved)
+            return any(abs(effect) > FAINT for effect in (t.effect(axis), *by_places))
+
+        return [t for t in self.thrusters if acts(t)]
 
     def shares_thrusters(self, one: Axis, other: Axis) -> bool:
         """Return True if a thruster acts on both axes."""
@@ -306,6 +315,7 @@ class Layout:
                 for t in self.thrusters
             ),
             (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
+            _declared(("geometry",), GEOMETRY, GEOMETRY if self.is_uncertain else ()),
             *(_declared(("point", p.name), POINT, p.keys, p.coefficient, point_words(p)) for p in self.points),
             _declared(("surface",), SURFACE, SURFACE if self.surface else ()),
         ]

@@ -261,8 +261,15 @@ def _extended(
     """
     base, deviations, centres = tests.base, tests.description.tables.priors, _centres(layout, shown)
     restoring = tuple(key for key in RESTORING if key in {*layout.restoring, *centres})
-    layout = replace(layout, mix={}, restoring=restoring)  # a log tells thrusters' commands
-    values = {name: base.get(name, 0.0 if name in centres else _UNKNOWN) for name in layout.coefficients}
+    # Positions at some hertz tell the acceleration too late: what differs would be taken for another geometry.
+    told = {c.quantity.name for log in tests.folder.logs for c in log.channels}
+    is_uncertain = (
+        layout.coupled and {"surge velocity", "sway velocity"} <= told and all(t.position for t in layout.thrusters)
+    )
+    # a log tells thrusters' commands
+    layout = replace(layout, mix={}, restoring=restoring, is_uncertain=is_uncertain and not layout.has_wrench)
+    absent = {*centres, "x_T", "y_T"}
+    values = {name: base.get(name, 0.0 if name in absent else _UNKNOWN) for name in layout.coefficients}
     layout, of_voltage = _with_voltage(layout, tests)
     values, more = of_voltage | values, dict[str, float]()
     logged, steady = {*tests.logged}, tests.folder.astern("steady")

@@ -31,7 +31,7 @@ def optional_effects(fit: Fit) -> Iterator[IdentifiedEffect]:
     yield from _strengths(fit)
     file, odds = fit.file.posterior, {row_of(fit.objective, one): value for one, value in fit.odds.items()}
     for n, p in enumerate(file.table.parameters):
-        if not p.is_effect or p.kind == STRENGTH:
+        if not (p.is_effect and p.of_kind.words):
             continue
         value, interval = _number(fit, n)
         posterior = fit.posterior if n in file.absent else file

@@ -14,12 +14,13 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.equation.catalogue import COUPLED_AXES, HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import EVERY_COMMAND, Curve, Part, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Curve, Part, Range, SourcedVector
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND, OWN_KEYS
 from rov_fmu.identify.likelihood.objective import changed
+from rov_fmu.identify.likelihood.parameters import ADAPTED
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Identification, IdentifiedCoefficient, Interval
 from rov_fmu.io.groups import grouped
@@ -89,7 +90,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Ident
         elif name not in {*names, *unseen}:
             sources[name] = UNDETERMINED
         elif not isclose(rov[name], tests.base.get(name, inf), rel_tol=_UNCHANGED):
-            sources[name] += "; adapted to the tests"
+            sources[name] += ADAPTED
     if names:
         held = [name for name in every if name not in {*names, *unseen}]
         indices = [every.index(name) for name in (*names, *held)]
@@ -173,16 +174,18 @@ def vehicle_of_file(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
     drag is that of the file. Raises RuntimeError: this program is wrong then.
     """
     top = Path(commonpath([folder.resolve(), *(path.resolve().parent for path in vehicle.files)]))
-    objective, least = copy(fit.file.objective), fit.file.minimum
-    objective.table = objective.table.of_file(least.z, fit.speeds)
-    of_fit = objective.value(least.z, objective.runs(least.z, least.runs))
+    objective, least = fit.file.objective, fit.file.minimum
+    near = copy(objective)
+    near.table = objective.table.of_file(least.z, fit.speeds)
+    of_fit = near.value(least.z, near.runs(least.z, least.runs))
     for digits in _DIGITS:
         short = _rounded(vehicle, digits)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             read = read_vehicle(top / "vehicle.toml", vehicle_text(short, top).encode())
-        objective.table = fit.file.objective.table.of_vehicle(read)
-        rise = objective.value(least.z, objective.runs(least.z, least.runs)) - of_fit
+        near = objective.with_thrusters(read.layout.thrusters)
+        near.table = near.table.of_vehicle(read)
+        rise = near.value(least.z, near.runs(least.z, least.runs)) - of_fit
         if abs(rise) < _SAME:
             return short
     raise RuntimeError(f"{folder}: J of the vehicle file differs by {rise:.3g} from that of the fit")
@@ -199,8 +202,15 @@ def _rounded(vehicle: Vehicle, digits: int) -> Vehicle:
         correlation = {other: r for other, value in row.correlation.items() if (r := round(value, digits))}
         return Estimated(error=short(row.error), correlation=correlation)
 
+    def vector(one: SourcedVector | None) -> Any:
+        return SourcedVector(tuple(map(short, one.value)), one.source) if one and one.source.endswith(ADAPTED) else one
+
+    thrusters = (
+        replace(t, direction=vector(t.direction), position=vector(t.position)) for t in vehicle.layout.thrusters
+    )
     return replace(
         vehicle,
+        layout=replace(vehicle.layout, thrusters=tuple(thrusters)),
         coefficients={name: short(value) for name, value in vehicle.coefficients.items()},
         command_range=ends(vehicle.command_range),
         basis={
@@ -324,6 +334,8 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         axes=tuple(form for form in kept.axes if own.has(form.axis)),
         coupled=layout.coupled and all(map(own.has, COUPLED_AXES)),
         curves=tuple(curve if curve.has_lag else replace(curve, lag="force") for curve in kept.curves),
+        thrusters=table.thrusters_in_file(file.z),
+        is_uncertain=False,
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=own.mix,

@@ -29,6 +29,7 @@ INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "loggin
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 TURN = "turned velocity sensor"
+DIRECTION, ARMS, SHIFT = "angle of the thrusters", "arms of the thrusters", "shift of the thrusters"
 STRENGTH, OWN_CURVE, NEUTRAL = "health", "curve of its own", "neutral"
 SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
@@ -104,7 +105,7 @@ class Kind(Coordinate):
     prior: Deviation | None = None
     """None where `deviation` is always the same, or follows from the log."""
     words: str = ""
-    """What an effect is."""
+    """What an effect is; empty for one that is told only relative to others of its kind."""
     why_not: str = ""
     """Why the vehicle file does not have the effect, after a full stop."""
     is_ratio: bool = False
@@ -138,6 +139,8 @@ class Kind(Coordinate):
     """True if no size is unusual where predictions over 10 s along its axis have no larger errors than the noise."""
     finest: float = 0.0
     """The half-width of the narrowest interval: what is smaller is no effect."""
+    roughest: float = 0.0
+    """The same relative to the coordinate."""
     force_power: float = 0.0
     """Its number is proportional to this power of the common scale of all forces, which motion does not tell."""
     speed_power: float = 0.0
@@ -395,6 +398,32 @@ KINDS = {
         null=0.0,
         unit="m",
     ),
+    DIRECTION: Kind(
+        Deviation("direction", 0.1, "the angle of the thrusters from ahead, rad", "frames differ by some degrees"),
+        "angle of the thrusters from ahead",
+        ". The vehicle file has their directions with it, in place of those given",
+        unit="rad",
+        finest=0.005,
+        adapts=True,
+    ),
+    ARMS: Kind(
+        Deviation("arms", 0.1, "the arms of the thrusters to the given ones", "places are known to some centimetres"),
+        mean=1.0,
+        low=0.3,
+        high=3.0,
+        null=1.0,
+        finest=0.01,
+        adapts=True,
+    ),
+    SHIFT: Kind(
+        Deviation("shift", 0.02, "the places of all thrusters about the centre of mass, m", "batteries are moved"),
+        "shift of the thrusters from their places,",
+        null=0.0,
+        unit="m",
+        finest=0.001,
+        roughest=0.15,
+        adapts=True,
+    ),
     "load": Kind(
         Deviation("load", 0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
         "constant load",
@@ -528,7 +557,6 @@ KINDS = {
         Deviation(
             "strength", 0.1, "the force of a thruster relative to its curve", "two thrusters of one type differ so"
         ),
-        "force of the thruster relative to a whole one",
         keys=("health",),
         is_coefficient=True,
         is_of_structure=True,

@@ -27,7 +27,7 @@ import numpy as np
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve
+from rov_fmu.equation.parts import Curve, Thruster
 from rov_fmu.identify.likelihood.curves import Drags, forces_of_curve, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, FilterRun
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table, table_of
@@ -229,9 +229,7 @@ class Objective:
         """Make the filters. Raises BuildError."""
         self.table, self.logs, self.rows, self.is_thinned = table, logs, rows, thinned
         self.records = [one.thinned if thinned else one.record for one in logs]
-        steps = _QUICK_STEPS if thinned else {}
-        filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
-        self.filters = [filters[one.layout] for one in logs]
+        self.filters = self._filters()
         self.mean, self.deviation, self.low, self.high = map(table.each, ("mean", "deviation", "low", "high"))
         self.whole = DataPart(range(len(logs)), range(len(rows)))
 
@@ -250,6 +248,29 @@ class Objective:
         chosen = {index: part.chosen[n] for index, n in enumerate(part.logs) if n in part.chosen}
         found.whole = DataPart(range(len(part.logs)), range(len(part.rows)), chosen)
         found.__dict__.pop("_of_rows", None)
+        return found
+
+    def _filters(self) -> list[Filter]:
+        steps = _QUICK_STEPS if self.is_thinned else {}
+        filters = {one.layout: Filter(one.vehicle(self.table.base), **steps) for one in self.logs}
+        return [filters[one.layout] for one in self.logs]
+
+    def with_thrusters(self, thrusters: Iterable[Thruster]) -> "Objective":
+        """Return J of a vehicle whose thrusters, by their names, surely have these directions and places.
+
+        It is a copy where they were certain before."""
+        now = {t.name: {"direction": t.direction, "position": t.position} for t in thrusters}
+
+        def changed(layout: Layout) -> Layout:
+            placed = tuple(replace(t, **now[t.name]) for t in layout.thrusters)
+            return replace(layout, thrusters=placed, is_uncertain=False)
+
+        found = copy(self)
+        if not self.table.layout.is_uncertain:
+            return found
+        found.table = replace(self.table, layout=changed(self.table.layout))
+        found.logs = [replace(one, layout=changed(one.layout)) for one in self.logs]
+        found.filters = found._filters()
         return found
 
     def without(self, absent: Iterable[int]) -> "Objective":

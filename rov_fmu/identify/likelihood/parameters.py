@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import product
-from math import log
+from math import log, pi
 from operator import attrgetter
 from typing import Any
 
@@ -12,11 +12,13 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Part
+from rov_fmu.equation.parts import FAINT, Curve, Part, SourcedVector, Thruster
 from rov_fmu.identify.likelihood.curves import Drags, Quadratic, nearest_drag
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.kinds import (
     ABSENT,
+    ARMS,
+    DIRECTION,
     INERTIA,
     KINDS,
     LAG,
@@ -30,6 +32,7 @@ from rov_fmu.identify.likelihood.kinds import (
     PRIORS,
     SENSOR_OFFSET,
     SENSOR_SCALE,
+    SHIFT,
     STRENGTH,
     TURN,
     WANDER,
@@ -50,6 +53,8 @@ _QUIETER = 2.0
 Where commands change between rows, it is at least all of it, because J is rough where a sensor is more exact."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
+ADAPTED = "; adapted to the tests"
+"""The end of the source of a number of the base that a fit changed."""
 HORIZONTAL = "horizontal"
 """What has a slow velocity along no axis of the body."""
 CURRENT = ("to the north", "to the east")
@@ -58,6 +63,8 @@ CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
 _PLACES = (*CENTRE,)
 """The parts of the place of a sensor."""
+_GEOMETRY = (ARMS, "", "g_r"), (SHIFT, "ahead", "x_T"), (SHIFT, "to starboard", "y_T")
+"""The parameters of the places of thrusters: the kind, the part, and the coefficient."""
 _LEAST_POWER = -0.9
 """The least q of quadratic drag. With -1, it would be linear drag once more."""
 _MOTION_STEP = 3e-6
@@ -191,6 +198,9 @@ class Table:
         for p, coordinate in zip(self.parameters, z, strict=True):
             for name in p.sets:
                 values[name] = p.number(coordinate)
+        if (angle := self.index(DIRECTION, YAW.name)) is not None:
+            given = self.parameters[angle].mean
+            values["g_u"], values["g_v"] = np.cos(z[angle]) / np.cos(given), np.sin(z[angle]) / np.sin(given)
         for axis in self.layout.bare_axes:
             beta = axis.coefficient("beta")
             values[beta] = self.base[beta] / self.get(z, INERTIA, axis.name, default=1.0)
@@ -298,6 +308,22 @@ class Table:
         """Return a table whose drag is that of a vehicle file, linear and quadratic, at some coordinates."""
         drag = {name: value for one in self.nearest_drags(z, top) for name, value in one.coefficients.items()}
         return replace(self, base={**self.base, **drag}, exact=self.exact.union(drag))
+
+    def thrusters_in_file(self, z: Array) -> tuple[Thruster, ...]:
+        """Return the thrusters with the directions and the places at some coordinates."""
+        c = self.coefficients(z)
+
+        def placed(t: Thruster) -> Thruster:
+            (X, Y, Z), (x, y, depth) = t.direction.value, t.place
+            direction = c["g_u"] * X, c["g_v"] * Y, Z
+            place = c["g_r"] * x + c["x_T"], c["g_r"] * y + c["y_T"], depth
+            now = []
+            for before, value in ((t.direction, direction), (t.position or t.direction, place)):
+                is_same = np.allclose(before.value, value, rtol=0.0, atol=FAINT)
+                now.append(before if is_same else SourcedVector(value, before.source + ADAPTED))
+            return replace(t, direction=now[0], position=now[1])
+
+        return tuple(map(placed, self.layout.thrusters)) if self.layout.is_uncertain else self.layout.thrusters
 
     def of_vehicle(self, vehicle: Vehicle) -> "Table":
         """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
@@ -492,6 +518,11 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
         if any("n_V" in c.keys for c in known.curves):
             yield make("voltage", parts=known.layout.curves)
         yield from _of_sensors(logs, make)
+    if known.layout.is_uncertain:
+        if (angle := _angle(known.layout)) is not None:
+            yield make(DIRECTION, YAW.name, mean=angle, low=0.5 * angle, high=0.5 * (angle + 0.5 * pi), null=angle)
+        for kind, part, key in _GEOMETRY:
+            yield make(kind, YAW.name, part, sets=(key,))
     yield from _of_curves(known, make, prior("thrust_shape"))
     yield from _advance(known, make)
     yield from _of_axes(known, make)
@@ -502,6 +533,15 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
         yield from _of_structure(known, make)
     for name in row_noises:
         yield make("row noise", name)
+
+
+def _angle(layout: Layout) -> float | None:
+    """Return the angle from ahead, rad, if all thrusters that push ahead or sideways have the same one."""
+    parts = [np.abs(t.direction.value) for t in layout.thrusters]
+    level = [(ahead, sideways) for ahead, sideways, _ in parts if max(ahead, sideways) > FAINT]
+    angles = {round(float(np.arctan2(sideways, ahead)), 9) for ahead, sideways in level}
+    is_one = len(angles) == 1 and all(min(one) > FAINT for one in level)
+    return angles.pop() if is_one else None
 
 
 def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:

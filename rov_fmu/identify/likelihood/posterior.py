@@ -104,7 +104,9 @@ class Posterior:
 
     def error(self, index: int) -> float:
         """Return the standard error of a coordinate, which is never less than its kind says."""
-        return max(float(self.errors[index]), self.table.parameters[index].of_kind.finest / QUANTILE)
+        kind = self.table.parameters[index].of_kind
+        least = max(kind.finest, kind.roughest * abs(float(self.z[index])))
+        return max(float(self.errors[index]), least / QUANTILE)
 
     def ends(self, index: int) -> Array:
         """Return a coordinate and the two ends of its 95 % interval."""

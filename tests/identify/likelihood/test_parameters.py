@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rov_fmu
 from rov_fmu import identify
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.beginning import begin, load_tests
@@ -18,6 +19,7 @@ from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.folders import HEAD, folder_of, pulled
 from tests.identify.conftest import add_voltage
 from tests.recordings import run, write_log
@@ -170,3 +172,30 @@ def test_code_asks_a_kind_what_it_declares_and_not_for_its_name() -> None:
         everywhere = {str(part.value) for part in nodes if isinstance(part, ast.Constant)}
         named = names & (literals | {text for text in everywhere if " " in text})
         assert not named or path.name in PHYSICS, path
+
+
+def test_the_file_of_an_uncertain_geometry_moves_as_the_fit() -> None:
+    """Its thrusters have other directions and places, and no coefficient of the geometry, along all six axes."""
+    whole = rov_fmu.load("bluerov2_heavy")
+    layout = replace(without_surface(whole).layout, mix={}, is_uncertain=True)
+    layout = layout.extended(curve.coefficient("d") for curve in layout.curves)
+    values = {name: whole.coefficients.get(name, 3.0) for name in layout.coefficients}
+    angle = {"g_u": np.cos(0.7) * np.sqrt(2.0), "g_v": np.sin(0.7) * np.sqrt(2.0)}
+    uncertain = {**angle, "g_r": 1.02, "x_T": 0.0046, "y_T": -0.012}
+    table = Table(layout, values | uncertain, {}, ())
+    placed = replace(layout, thrusters=table.thrusters_in_file(np.zeros(0)), is_uncertain=False)
+    of_file = Vehicle(placed, {name: values[name] for name in placed.coefficients})
+    assert not {*uncertain} & {*of_file.coefficients}
+    of_fit, rng = Vehicle(layout, table.base), np.random.default_rng(0)
+    for thruster in placed.thrusters:
+        X, Y, Z = thruster.direction.value
+        assert abs(Z) == pytest.approx(1.0) or np.arctan2(abs(Y), abs(X)) == pytest.approx(0.7)
+    for _ in range(5):
+        inputs = layout.usual_inputs | {name: rng.uniform(-1.0, 1.0) for name in layout.commands}
+        state = layout.at_rest | {axis.velocity: rng.uniform(-1.0, 1.0) for axis in layout.bare_axes}
+        state |= {name: rng.uniform(-20.0, 20.0) for name in layout.at_rest if name.startswith("F_")}
+        one, other = (vehicle.derivatives(inputs, state) for vehicle in (of_fit, of_file))
+        for axis in layout.bare_axes:
+            assert other[axis.velocity] == pytest.approx(one[axis.velocity], rel=1e-9, abs=1e-9)
+    certain = Table(layout, values | {"g_u": 1.0, "g_v": 1.0, "g_r": 1.0, "x_T": 0.0, "y_T": 0.0}, {}, ())
+    assert certain.thrusters_in_file(np.zeros(0)) == layout.thrusters
