@@ -52,6 +52,9 @@ _STANDS = 0.1
 _LEAST, _LEAST_HORIZONTAL = 1.2, 3.0
 """The least time of contradiction in a rest in heave, and in surge or sway, s. Of the right dives, none has 1.2 s in
 heave. A DVL without lock shows 0 for about 3 s, and 2 s along surge would cost a right dive with a stale one 23 s."""
+_IDLE, _FLOATS, _AVERAGED = 0.03, 0.5, 1.0
+"""Without a push: the largest command, how far the load must be able to move a vehicle that is free, m, and the time
+over which a depth is averaged, s."""
 _ROUNDS = 30
 """How often the samples are weighed anew by their errors."""
 _LEAST_PIECE = 5.0
@@ -104,6 +107,9 @@ class _Course:
     """n: how much of it the motion shows; NaN where this acceleration is not significant."""
     drag: Array
     """n: the share of it that overcomes drag."""
+    law: tuple[float, float, float]
+    """The acceleration of a vehicle at rest without a push, m/s^2, 0 if it is not significant, and what the quadratic
+    and the linear drag take of it."""
 
 
 def _course(log: Log, commands: Commands, channel: Channel, axis: Axis, layout: Layout) -> _Course:
@@ -163,6 +169,8 @@ def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, 
         count = len(own) - away
         if count * _STEP >= least and count > away + np.sum(np.abs(place[free] - at) < still):
             leave_out(start, end, own)
+    if is_depth:
+        rests |= _unpushed(course, still)
     for start, end in true_runs(rests):  # nothing that dives is above the surface, or below a bottom
         side = side_of(at := float(np.median(place[start : end + 1])))
         for first, last in true_runs(side * (place - at) < near) if side else ():
@@ -194,16 +202,16 @@ def _stays(place: Array, slow: Flags, near: float, still: float) -> Flags:
 
 def _shares(
     time: Array, place: Array, rows: Array, thrust: Array, times: Array, others: Sequence[Array]
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, tuple[float, float, float]]:
     """Return the acceleration that the push and others give a vehicle at rest, m/s^2, how much of it the motion shows,
-    and the share that overcomes drag, at equal steps of time.
+    and the share that overcomes drag, at equal steps of time; then the law without a push, as `_Course` has it.
 
     All numbers are means over the same window, with the weights that a second derivative has in it.
     """
     count, size = len(time), 2 * _HALF + 1
     given, share, drag = np.full((3, count), np.nan)
     if count <= size:
-        return given, share, drag
+        return given, share, drag, (0.0, 0.0, 0.0)
     steps = _STEP * np.arange(-_HALF, _HALF + 1)
     curve, weights = steps**2 - np.mean(steps**2), (1.0 - (steps / (steps[-1] + _STEP)) ** 2) ** 2
     windows = sliding_window_view(place, size)
@@ -217,7 +225,7 @@ def _shares(
     causes = np.column_stack([*acting, -rate * np.abs(rate), -rate])
     _, large = usual_range(np.abs(rate))
     if np.sum(moving := known & (np.abs(rate) > _MOVES * large)) < _LEAST_STEPS:
-        return given, share, drag
+        return given, share, drag, (0.0, 0.0, 0.0)
     some, shown = causes[moving], acceleration[moving]
     weight = np.ones(len(some))
     for _ in range(_ROUNDS):  # towards the least sum of absolute errors, which a rest among the samples hardly moves
@@ -232,7 +240,35 @@ def _shares(
     is_told = known & (np.abs(push) > _SIGNIFICANT * error)
     share[_HALF:-_HALF][is_told] = ((acceleration - slowed) / push)[is_told]
     drag[_HALF:-_HALF][is_told] = (slowed / push)[is_told]
-    return given, share, drag
+    is_loaded = abs(found[1]) > _SIGNIFICANT * noise * np.sqrt(spread[1, 1])
+    load, square, linear = (float(one) for one in found[[1, -2, -1]])
+    return given, share, drag, (load * is_loaded, max(square, 0.0), max(linear, 0.0))
+
+
+def _unpushed(course: _Course, still: float) -> Flags:
+    """Return when a vehicle that its load moves stays at the least or the largest depth of the log without a push, for
+    so long that the load alone would have moved it far if it were free."""
+    load, square, linear = course.law
+    place, found = course.place, np.zeros(len(course.time), bool)
+    if not load:
+        return found
+    steady = 2.0 * abs(load) / (linear + np.sqrt(linear**2 + 4.0 * square * abs(load)) or 1e-9)
+    width = round(_AVERAGED / _STEP)
+    mean = np.convolve(np.pad(place, width, mode="edge"), np.ones(width) / width, mode="same")[width:-width]
+    stays = (np.abs(course.push) < _IDLE) & (np.abs(np.gradient(mean, _STEP)) < max(_SLOW * steady, 0.01))
+    for start, end in true_runs(stays):
+        rate = way = 0.0
+        for _ in range(start, end):
+            rate += _STEP * (abs(load) - square * rate * rate - linear * rate)
+            way += _STEP * rate
+        if way > _FLOATS and np.ptp(place[start : end + 1]) < _SLOW * way:
+            found[start : end + 1] = True
+    dived = place[~found & (place > -still)]
+    least, largest = float(dived.min(initial=np.inf)), float(dived.max(initial=-np.inf))
+    for start, end in true_runs(found):
+        if least + still < np.median(place[start : end + 1]) < largest - still:
+            found[start : end + 1] = False
+    return found
 
 
 def _moved_by_hand(told: Array, at: int, side: int) -> int:

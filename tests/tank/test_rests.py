@@ -153,6 +153,25 @@ def ends_below(t: float, s: State) -> None:
     s.down = 0.35 if t > 88.0 else s.down
 
 
+def stuck_below(t: float, s: State) -> None:
+    """Thrusters that are off in the mud of the bottom, which holds a vehicle that floats."""
+    s.down = 0.5 if 50.0 < t < 60.0 else 0.0 if 60.0 <= t < 80.0 else -0.4 if 80.0 <= t < 84.0 else s.down
+    s.w = 0.0 if 60.0 <= t < 80.0 else s.w
+
+
+def drifts_above(t: float, s: State) -> None:
+    """Thrusters that are off at the surface, to which the load has lifted the vehicle."""
+    s.down = 0.0 if t < 20.0 else 0.5 if t < 26.0 else s.down
+
+
+def held_by_its_tether(t: float, s: State) -> None:
+    s.w = 0.0 if 50.0 < t < 66.0 else s.w
+
+
+def off_for_a_while(t: float, s: State) -> None:
+    s.down = 0.0 if 50.0 < t < 66.0 else 0.4 if 66.0 <= t < 72.0 else s.down
+
+
 def pushes_on(t: float, s: State) -> None:
     s.down = 0.3 if 20.0 < t < 26.0 or 40.0 < t < 56.0 or 64.0 < t < 74.0 else s.down
 
@@ -169,6 +188,8 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
         (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
+        (drawn(12, drifts_above, start=0.05, load=-0.5), [(0.0, 22.0)], [(1.0, 19.5)]),
+        (drawn(11, stuck_below, dives_to(7.0), load=-0.5), [(0.0, 110.0)], [(63.0, 79.0)]),
         (drawn(10, rises_beyond, start=4.0, zeroed=4.0), [(0.0, 110.0)], [(14.0, 17.5)]),
     ],
     ids=[
@@ -181,6 +202,8 @@ def pushes_on(t: float, s: State) -> None:
         "hand",
         "pulled up",
         "wall",
+        "thrusters off at the surface",
+        "thrusters off on the bottom",
         "depth set to zero again",
     ],
 )
@@ -193,6 +216,12 @@ def test_a_rest_is_left_out_with_one_finding(
     assert left[np.any([(start <= time) & (time <= end) for start, end in at_least], axis=0)].all()
     assert not left[~np.any([(start <= time) & (time <= end) for start, end in within], axis=0)].any()
     assert [one.kind for piece in pieces for one in piece.findings] == ["rests"]
+
+
+def test_a_vehicle_that_stays_in_mid_water_without_a_push_rests_against_nothing() -> None:
+    """Its tether may hold it, or a thermocline, and the log does not tell until when."""
+    dive = drawn(13, off_for_a_while, held_by_its_tether, load=-0.5)
+    assert without_rests(dive, LAYOUT) == [dive]
 
 
 @pytest.mark.parametrize("load", [-4.0, -2.0, 0.0, 3.0])
