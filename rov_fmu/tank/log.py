@@ -63,6 +63,8 @@ class Channel:
     """n: NaN where there is no measurement. Angles may wrap."""
     file: str = ""
     """The file that it is from, in a dive of several files."""
+    of_log: int = 0
+    """The number of measurements in the whole log; 0 where this is no piece of one."""
     unused: str = ""
     """Why the channel is not used, such as `a setpoint`; empty for a channel that is used."""
     derived_from: str = ""

@@ -119,7 +119,9 @@ def without_spans(
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         rows = commands.rows[(commands.rows >= start) & (commands.rows <= end)]
         channels = [
-            replace(channel, time=channel.time[at], values=channel.values[at])
+            replace(
+                channel, time=channel.time[at], values=channel.values[at], of_log=max(channel.of_log, channel.count)
+            )
             for channel in log.channels
             if (at := (channel.time >= start) & (channel.time <= end) & channel.there).any()
         ]

@@ -39,6 +39,8 @@ for a rotation."""
 AT_ORIGIN = (0.0, 0.0, 0.0)
 """The place of a sensor at the origin."""
 _CURRENT = ("V_N", "V_E", "V_D")
+_LEARNS = 5.0
+"""The time within which the filter learns a velocity that no sensor measures, s."""
 
 
 @dataclass(frozen=True)
@@ -92,11 +94,22 @@ class Record:
     wanders: bool = False
     """True if the slow horizontal velocity is an error of the sensors of velocity, which those of position do not have.
     """
+    in_motion: bool = False
+    """True if the vehicle moves at the first sample with a velocity that nothing measures."""
     beside: Array | None = None
     """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
     change along straight lines from row to row."""
     anew: Indices | None = None
     """m: 0 for a row that goes on with the change of the row before, and shares its delay. None: there is none."""
+
+    @property
+    def uncounted(self) -> int:
+        """How many samples at the begin do not count in J: those from which the filter learns an unknown velocity.
+
+        Their errors come from the start, and what explains them is a wrong vehicle.
+        """
+        end = self.time[0] + min(_LEARNS, 0.5 * (self.time[-1] - self.time[0]))
+        return int(np.searchsorted(self.time, end)) if self.in_motion else 0
 
     def after(self, begin: float) -> Flags:
         """Return which samples belong to a prediction that starts `begin` (s) after the first one.

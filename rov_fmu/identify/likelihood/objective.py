@@ -368,7 +368,8 @@ class Objective:
 
     def chosen(self, n: int) -> slice:
         """Return the samples of a log that count; all rows of tables, which follow the logs, do."""
-        return self.whole.chosen.get(n, slice(None))
+        part = self.whole.chosen.get(n, slice(0, None))
+        return slice(max(part.start or 0, self.records[n].uncounted if n < len(self.records) else 0), part.stop)
 
     def _sum(self, z: Array, samples: Sequence[Samples]) -> float:
         """Return J for the samples of each log, and then those of the rows."""

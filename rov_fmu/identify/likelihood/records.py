@@ -36,6 +36,10 @@ FREE_DECAY = "free decay"
 """The kind of the finding about a log in which a vehicle slows down without thrust."""
 _CALM = 0.3
 """The standard deviation of an unknown velocity at the start, m/s or rad/s."""
+_MOVING = 1.0
+"""The same ahead and sideways of a vehicle that is driven then, or moves along another axis, m/s."""
+_LEAST_OF_PIECE = 4
+"""The fewest samples in a piece of a log, where the whole log has enough."""
 _LEVEL = 0.1
 """The standard deviation of an unknown angle at the start, rad."""
 _LEAST_CHANGE = 0.001
@@ -193,8 +197,12 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
     full = _samples(measured, begin, FASTEST, averaged=True)
     thin = _samples(measured, begin, THINNED, averaged=False)
     start, errors = _start(measured, layout, decaying)
+    in_motion = [] if log.axis else _begins_in_motion(measured, layout, inputs[0], start)
+    errors |= {axis.velocity: max(errors[axis.velocity], _MOVING) for axis in in_motion}
     sensors = tuple(m.sensor for m in measured)
-    record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout), _wanders(measured))
+    record = Record(
+        sensors, *full, since, told, inputs, start, errors, _tilt(log, layout), _wanders(measured), bool(in_motion)
+    )
     time, value, sensor = thin
     thinned = replace(record, time=time, value=value, sensor=sensor)
     return SampledLog(log, layout, measured, record, thinned, log.commands.interval, axes, lost)
@@ -277,7 +285,7 @@ def _wanders(measured: Sequence[SampledChannel]) -> bool:
 
 def _why_left_out(channel: Channel) -> str:
     """Return the kind of the finding that says why a channel tells nothing; empty for one that the filter reads."""
-    if channel.count < LEAST_SAMPLES:
+    if max(channel.count, channel.of_log) < LEAST_SAMPLES or channel.count < _LEAST_OF_PIECE:
         return "too few samples"
     return "" if np.ptp(channel.values) > 0.0 else "constant motion"
 
@@ -448,6 +456,21 @@ def _start(
     elif "psi" in layout.state:
         start["psi"], errors["psi"] = angles[2] or (0.0, _LEVEL)
     return start, errors
+
+
+def _begins_in_motion(
+    measured: Sequence[SampledChannel], layout: Layout, inputs: Array, start: Mapping[str, float]
+) -> list[Axis]:
+    """Return along which of surge and sway a dive that shows them may begin with any velocity: where this is not
+    measured, and the vehicle is driven at the first sample, or sinks, rises or turns. `inputs` are those of the first
+    row."""
+    shown = {(m.axis, m.sensor.is_velocity) for m in measured}
+    axes = [axis for axis in (SURGE, SWAY) if layout.has(axis)]
+    commands = [n for n, name in enumerate(layout.inputs) if name in layout.commands]
+    moves = any(abs(start.get(axis.velocity, 0.0)) > _LEAST_SPEED for axis in (HEAVE, YAW))
+    is_driven = bool(np.abs(inputs[commands]).max(initial=0.0) > _LEAST_PUSH)
+    unknown = [axis for axis in axes if (axis, True) not in shown]
+    return unknown if (moves or is_driven) and not {SURGE, SWAY}.isdisjoint(axis for axis, _ in shown) else []
 
 
 def typical(some: Sequence[SampledLog], axis: Axis) -> float:

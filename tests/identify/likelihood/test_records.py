@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from rov_fmu.identify.likelihood.records import driven_axes, recorded, typical
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Channel, Log
+from rov_fmu.tank.quality import without_spans
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle, without_surface
 from tests.tank.logs import channel, commands, log
 from tests.vehicles import VIDEORAY
 
@@ -201,3 +203,54 @@ def test_the_attitude_at_the_start_is_that_of_the_first_angles() -> None:
     x, y, z, w = Rotation.from_euler("ZYX", [*angles.values()]).as_quat()
     assert [sampled.record.start[name] for name in QUATERNION] == pytest.approx([w, x, y, z])
     assert {sampled.record.errors[name] for name in QUATERNION} == {0.1}
+
+
+LAYOUT = without_surface(load_vehicle(SHIPPED["bluerov2"])).layout
+PUSH: Array = 0.3 + 0.2 * np.sin(2.0 * TIME)
+DRIVEN = {"1": -PUSH, "2": -PUSH, "3": PUSH, "4": PUSH, "5": PUSH, "6": PUSH}
+SECONDS = TIME[::10]
+TRACK = (
+    channel("surge distance", SECONDS, 0.4 * SECONDS + 0.02 * SECONDS**2),
+    channel("sway distance", SECONDS, 0.1 * np.sin(SECONDS)),
+)
+
+
+def test_a_piece_keeps_the_few_positions_of_a_log_that_has_enough() -> None:
+    """A log of 20 positions is cut at 5 s. A log that has 19 in all has none that count, whole or in pieces."""
+    whole = log(commands(TIME, DRIVEN), *TRACK, *moving("heading"))
+    few_of = (replace(one, time=one.time[:-1], values=one.values[:-1]) for one in TRACK)
+    for dive_of, are_read in ((whole, True), (replace(whole, channels=(*few_of, *moving("heading"))), False)):
+        for piece in (dive_of, *without_spans(dive_of, [(4.9, 5.2)], [])):
+            axes, findings = driven_axes(piece, LAYOUT)
+            assert (SURGE in axes) == are_read, piece.file
+            assert ("too few samples" in {one.kind for one in findings}) != are_read
+    short = without_spans(whole, [(3.1, 3.2)], [])[0]  # four positions
+    assert SURGE in driven_axes(short, LAYOUT)[0]
+    assert SURGE not in driven_axes(without_spans(whole, [(2.1, 2.2)], [])[0], LAYOUT)[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_unknown"),
+    [
+        ({}, True),
+        ({"commands": commands(TIME, {name: c * (TIME > 1.0) for name, c in DRIVEN.items()})}, False),
+        ({"channels": (*moving("heading", "depth"),)}, False),
+        ({"channels": (*moving("heading", "surge velocity"), channel("sway velocity", TIME, 0.1 * STEP))}, False),
+    ],
+    ids=["driven", "at rest", "not shown", "measured velocities"],
+)
+def test_a_dive_that_begins_in_motion_counts_from_when_its_velocity_is_known(
+    changes: dict[str, Any], is_unknown: bool
+) -> None:
+    sampled = recorded(replace(log(commands(TIME, DRIVEN), *TRACK, *moving("heading")), **changes), LAYOUT)
+    assert sampled
+    for record in (sampled.record, sampled.thinned):
+        assert record.in_motion == is_unknown
+        assert (record.time[record.uncounted] - record.time[0] >= 5.0) == is_unknown
+        assert (record.uncounted == 0) != is_unknown
+    if SURGE in {m.axis for m in sampled.measured}:
+        is_measured = any(m.axis is SURGE and m.sensor.is_velocity for m in sampled.measured)
+        assert (sampled.record.errors["u"] >= 1.0) == is_unknown
+        assert (sampled.record.errors["u"] < 0.1) == is_measured
+    short = replace(sampled.record, time=sampled.record.time[sampled.record.time < 4.0])  # half of it counts
+    assert short.time[short.uncounted] - short.time[0] == pytest.approx(2.0 * is_unknown, abs=0.11)
