@@ -103,9 +103,9 @@ _NOTHING = 0.001
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
 
-MOST_UNKNOWN = 0.05
-"""A model must not be used if unknown slow forces, changes of the thrust and velocities over ground together exceed
-this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
+MOST_UNKNOWN, WORST_UNKNOWN = 0.05, 0.15
+"""A model is at most *usable*, and must not be used, if unknown slow forces, changes of the thrust and velocities over
+ground together exceed these shares of the thrust and of the velocity: what is unknown acts differently elsewhere."""
 LEAST_TESTED = 0.05
 """A direction of an axis is tested by commands from this one."""
 _ABOUT = 1.05

@@ -9,6 +9,7 @@ from rov_fmu.identify.findings import acting, effect_in_words, tested_in_words, 
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
+    WORST_UNKNOWN,
     WRONG,
     Answer,
     AxisResult,
@@ -218,8 +219,8 @@ RULES = (
     Rule(
         "unknown disturbances, relative to thrust or velocity",
         lambda e: sum(d.share for d in e.unknown),
-        None,
         MOST_UNKNOWN,
+        WORST_UNKNOWN,
         "{what} in {file}.",
         _largest,
         remedy=_again,

@@ -153,7 +153,7 @@ def fit_all(
     odds = search.odds
     if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
-    misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best)))
+    misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best, late=True)))
     ratios = {axis: one.widens for axis, one in misfits.items()}
     unseen = unseen_errors(full, best.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)

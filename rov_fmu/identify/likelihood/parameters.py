@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import GEOMETRY, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import FAINT, Curve, Part, SourcedVector, Thruster
 from rov_fmu.identify.likelihood.curves import Drags, Quadratic, nearest_drag
@@ -326,8 +326,10 @@ class Table:
         return tuple(map(placed, self.layout.thrusters)) if self.layout.is_uncertain else self.layout.thrusters
 
     def of_vehicle(self, vehicle: Vehicle) -> "Table":
-        """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
+        """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent. Its
+        thrusters stand as given."""
         values, keys_in_file = dict(vehicle.with_(self.layout).coefficients), self.layout.keys_in_file
+        values |= {key: self.base[key] for key in GEOMETRY if self.layout.is_uncertain}
         parts = {keys[:-1] for keys in vehicle.layout.keys_in_file.values()}
         names = {keys: name for name, keys in keys_in_file.items()}
         for name, (*part, key) in keys_in_file.items():  # a coefficient astern stands after that ahead

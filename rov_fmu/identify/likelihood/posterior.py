@@ -12,6 +12,7 @@ from math import log
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.result import CONSTANTS, Interval
@@ -59,10 +60,11 @@ class Posterior:
         covariance[np.ix_(free, free)] = root @ root.T
         return cls(table, z, covariance, frozenset(absent))
 
-    def widened(self, ratios: Mapping[Axis, float], unseen: Array) -> "Posterior":
+    def widened(self, ratios: Mapping[Axis, tuple[float, float]], unseen: Array) -> "Posterior":
         """Return the posterior with larger errors of what concerns axes whose structure is wrong.
 
-        `ratios` are the errors R of predictions along each axis, relative to the noise; 0 where nothing tells. As with
+        `ratios` are the errors of predictions along each axis, relative to the noise, and those of what changes its
+        times, the inertia and lags: what is fast changes no steady velocity. They are 0 where nothing tells. As with
         Birge's ratio (Birge 1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1):
         what the structure lacks is the same in n samples in turn, while noise differs from sample to sample. What
         thrusters lack shows along all axes that they drive.
@@ -74,21 +76,28 @@ class Posterior:
         unseen = unseen * np.outer(is_free, is_free)
         return replace(wider, covariance=wider.covariance + unseen) if unseen.any() else wider
 
-    def _with_less_information(self, ratios: Mapping[Axis, float]) -> "Posterior":
-        layout, worst = self.table.layout, max(ratios.values(), default=0.0)
-        of = {axis.name: ratio for axis, ratio in ratios.items()}
-        for t in layout.thrusters:
-            along = [ratio for axis, ratio in ratios.items() if ratio and t in layout.thrusters_along(axis)]
-            for name in (t.name, t.curve) if along else ():
-                of[name] = min([of.get(name, _WORST), *along])
+    def _with_less_information(self, ratios: Mapping[Axis, tuple[float, float]]) -> "Posterior":
         parameters = self.table.parameters
-        errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
-        factors = np.sqrt(1.0 + CONSTANTS["alike"].value * np.maximum(errors**2 - 1.0, 0.0))
+        usual, fast = (self._errors_by_name({axis: both[n] for axis, both in ratios.items()}) for n in (0, 1))
+        of = [fast if p.of_kind.is_lag or p.kind == INERTIA else usual for p in parameters]
+        errors = [min(own.get(p.of, own[""]), _WORST) * p.of_motion for own, p in zip(of, parameters, strict=True)]
+        factors = np.sqrt(1.0 + CONSTANTS["alike"].value * np.maximum(np.square(errors) - 1.0, 0.0))
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
         data = self._inverse - prior
         return self.of(self.table, self.z, 2.0 * (prior + data / np.outer(factors, factors)), self.absent)
+
+    def _errors_by_name(self, ratios: Mapping[Axis, float]) -> dict[str, float]:
+        """Return the error of what concerns an axis, a thruster or a curve, by its name, and of all else as that of an
+        empty name, which is the largest."""
+        layout, of = self.table.layout, {axis.name: ratio for axis, ratio in ratios.items()}
+        of[""] = max(ratios.values(), default=0.0)
+        for t in layout.thrusters:
+            along = [ratio for axis, ratio in ratios.items() if ratio and t in layout.thrusters_along(axis)]
+            for name in (t.name, t.curve) if along else ():
+                of[name] = min([of.get(name, _WORST), *along])
+        return of
 
     @property
     def _inverse(self) -> Array:

@@ -114,12 +114,13 @@ class Misfit:
         return Misfit(*map(max, astuple(self), astuple(other)))
 
     @property
-    def widens(self) -> float:
-        """The error by which intervals become wider."""
-        return max(self.ratio, min(self.soon, WRONG) if self.soon > CONSTANTS["soon"].value else 0.0)
+    def widens(self) -> tuple[float, float]:
+        """The errors by which intervals become wider: of all that concerns an axis, and of its times."""
+        soon = min(self.soon, WRONG) if self.soon > CONSTANTS["soon"].value else 0.0
+        return self.ratio, max(self.ratio, soon)
 
 
-def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, Misfit]:
+def structure(objective: Objective, best: Minimum, *, ahead: bool = False, late: bool = False) -> dict[Axis, Misfit]:
     """Return how much larger the errors along each axis are than the noise of the sensor.
 
     The fit has seen these data, so only its structure can be wrong. The errors are those of predictions over 10 s, even
@@ -129,6 +130,9 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     that is unstable without them. The errors of such a log are the innovations of a filter without slow processes,
     relative to its own standard deviations, and say nothing about the motion. If `ahead` is True, they are those of
     predictions over 10 s there, too, as long as the log has no short force, which stands for these commands.
+
+    If `late` is True, errors that the filter expects do not count, because a command changed at an unknown time between
+    two rows. The alarm counts them: what the structure lacks may look like lateness, and would silence it.
     """
     found: dict[Axis, Misfit] = {}
     errors_of = dict[tuple[Axis, bool], list[tuple[float, float]]]()
@@ -142,7 +146,8 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         try:
             if is_motion:
                 run = objective.run(best.z, n, begin=begin, span=AHEAD)
-                errors = run.innovations / np.array(least)[record.sensor]
+                expected = _expected(objective, best.z, n, begin, AHEAD) if late else 0.0
+                errors = run.innovations / np.maximum(np.array(least)[record.sensor], expected)
             else:
                 run = objective.run(_without_slow_noise(objective.table, best.z), n)
                 errors = run.innovations / np.sqrt(run.variances)
@@ -195,7 +200,8 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
                 at = counts & own
                 if span == _SOON and at.sum() >= _FEWEST:
                     least = CONSTANTS["least soon"].value * unchanged(record.time[at], record.value[at], _SOON)
-                    soon = Misfit(soon=rms(run.innovations[at]) / max(noise, least))
+                    expected = _expected(objective, best.z, n, begin, _SOON)[at]
+                    soon = Misfit(soon=rms(run.innovations[at] / np.maximum(expected, max(noise, least))))
                     found[axis] = soon.or_larger(found.get(axis, Misfit()))
                 if axis in inertias:
                     pairs = np.column_stack([run.innovations, slopes[:, axes.index(axis)]]) / noise
@@ -209,6 +215,12 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
         spread = Misfit(spread=min(_spread(values, weights), 1.0))
         found[axis] = spread.or_larger(found.get(axis, Misfit()))
     return found
+
+
+def _expected(objective: Objective, z: Array, n: int, begin: float, span: float) -> Array:
+    """Return the standard deviations that the filter expects of the errors of predictions of a log by a right
+    structure: of sensors, of where a prediction begins, and of commands whose time of change no row tells."""
+    return np.sqrt(objective.run(_without_slow_noise(objective.table, z), n, begin=begin, span=span).variances)
 
 
 def _after_steps(push: Array, told: Array, time: Array) -> Iterator[Flags]:

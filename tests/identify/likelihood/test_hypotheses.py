@@ -727,17 +727,18 @@ def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(mo
     narrow = Posterior.of(table, model.mean, np.diag(2.0 / (0.01 * deviation) ** 2))
     axes = [form.axis for form in model.table.known.layout.axes]
     nothing = np.zeros((len(deviation), len(deviation)))
-    assert narrow.widened(dict.fromkeys(axes, 1.0), nothing) is narrow
-    errors = narrow.widened(dict.fromkeys(axes, 1.01), nothing).errors
+    assert narrow.widened(dict.fromkeys(axes, (1.0, 1.0)), nothing) is narrow
+    errors = narrow.widened(dict.fromkeys(axes, (1.01, 1.01)), nothing).errors
     slightly = errors[model.free] / narrow.errors[model.free]
     assert 1.0 <= slightly.min() <= slightly.max() < 1.03, "there is no cliff"
-    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes}, nothing)
-    for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
-        if p.kind == "inertia":
-            factor = np.sqrt(1.0 + 2.0 * 24.0) if p.of == "heave" else 1.0
-            assert after == pytest.approx(factor * before, rel=0.02)
-        assert after <= prior * (1.0 + 1e-6)
-    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf), nothing).errors <= deviation * (1.0 + 1e-6))
+    for of_all, factor in ((5.0, np.sqrt(1.0 + 2.0 * 24.0)), (1.0, 1.0)):
+        wide = narrow.widened({axis: (of_all, 5.0) if axis.name == "heave" else (1.0, 1.0) for axis in axes}, nothing)
+        for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
+            if p.kind in ("inertia", "quadratic drag"):
+                own = np.sqrt(1.0 + 2.0 * 24.0) if p.kind == "inertia" else factor
+                assert after == pytest.approx((own if p.of == "heave" else 1.0) * before, rel=0.02)
+            assert after <= prior * (1.0 + 1e-6)
+    assert np.all(narrow.widened(dict.fromkeys(axes, (np.inf, np.inf)), nothing).errors <= deviation * (1.0 + 1e-6))
 
 
 # ---- The search ------------------------------------------------------------------------------------------------------

@@ -79,7 +79,7 @@ def test_predictions_take_shorter_steps_where_the_motion_of_wide_parameters_dive
     ):
         again = ahead(fit.objective, 0, z, covariance, 5.0, 10.0)
         assert again[0] == pytest.approx(errors)
-        assert again[1] == pytest.approx(deviations, rel=0.05)
+        assert again[1] == pytest.approx(deviations, rel=0.1)
 
 
 def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:
@@ -103,7 +103,7 @@ def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:
     for axis, one in with_steps(fit.objective, fit.best, ratios).items():
         assert (one.ratio, one.spread) == (ratios[axis].ratio, 0.0)
         assert 0.85 < one.soon < CONSTANTS["soon"].value
-        assert one.widens == one.ratio
+        assert one.widens == (one.ratio, one.ratio)
 
 
 def test_a_log_in_which_an_axis_hardly_moves_tells_little_of_what_the_structure_lacks(tmp_path: Path) -> None:
