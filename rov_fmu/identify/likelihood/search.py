@@ -31,7 +31,16 @@ from rov_fmu.identify.likelihood.hypotheses import (
     row_of,
     thrusters_alike,
 )
-from rov_fmu.identify.likelihood.kinds import INERTIA, NEUTRAL, OWN_CURVE, SHORTEST_LAG, WHITE, WIDTH
+from rov_fmu.identify.likelihood.kinds import (
+    INERTIA,
+    NEUTRAL,
+    OWN_CURVE,
+    POWER,
+    POWER_ASTERN,
+    SHORTEST_LAG,
+    WHITE,
+    WIDTH,
+)
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
@@ -81,6 +90,7 @@ _HALF = 0.5
 MOST_OF_ROW = CONSTANTS["most of row"].value
 """Commands that change within more than this part of the time between two rows are momentary values: they change at any
 time."""
+_FORMS = (POWER, POWER_ASTERN)
 LEAST_LACK = 0.01
 """What the structure lacks is at least this standard error of the logarithms of speeds and inertias."""
 _IDLE_STEP = 0.1
@@ -305,7 +315,8 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
 
     What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
     and the inertia m/s. It acts on times as a scale of the inertia alone. It is as large in unseen data, so it has the
-    size of the errors over 10 s. The inertia also has the spread of the steps.
+    size of the errors over 10 s. The inertia also has the spread of the steps. Drag with another power than 2 is only
+    near what an unusual hull has, such as one whose drag falls at a speed, so that it lacks something, too.
 
     Where commands change between the rows of a log, or rows are means, they act a small part of their window earlier or
     later along each axis, because a stick and a controller change them at other times. The axis then answers earlier or
@@ -322,7 +333,9 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     found = np.zeros((len(z), len(z)))
     vehicle, shapes = objective.table.model(z)
     for axis, misfit in misfits.items():
-        lack = hypot(LEAST_LACK, min(CONSTANTS["lack"].value * misfit.lack, 1.0))
+        powers = [abs(float(z[n])) for n, p in enumerate(parameters) if p.of == axis.name and p.kind in _FORMS]
+        form = CONSTANTS["form"].value * max(powers, default=0.0)
+        lack = hypot(LEAST_LACK, form, min(CONSTANTS["lack"].value * misfit.lack, 1.0))
         scale = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
         is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
         found += lack**2 * np.outer(scale, scale) + np.diag((lack**2 + misfit.spread**2) * is_inertia)

@@ -34,7 +34,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     in_order,
     twins,
 )
-from rov_fmu.identify.likelihood.kinds import KINDS, NEUTRAL, OWN_CURVE, STRENGTH, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, NEUTRAL, OWN_CURVE, POWER, POWER_ASTERN, STRENGTH, TURN
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledLog, beside_lines, lost_between_rows
@@ -691,6 +691,20 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     narrow = Posterior(table, z, np.diag(np.full(len(z), 1e-4)))
     assert np.allclose(narrow.widened({}, found).covariance, narrow.covariance + found)
     assert narrow.widened({}, np.zeros_like(found)) is narrow
+
+
+@pytest.mark.parametrize("kind", [POWER, POWER_ASTERN])
+@pytest.mark.parametrize("power", [-0.5, 0.5])
+def test_an_unusual_form_of_drag_is_a_lack_of_its_axis_alone(kind: str, power: float, model: Objective) -> None:
+    table, z = model.table, model.mean.copy()
+    n = table.index(kind, "surge")
+    assert n is not None
+    z[n] = power
+    found = np.diag(unseen_errors(model, z, {}, {axis: Misfit() for axis in table.layout.bare_axes}))
+    for m, p in enumerate(table.parameters):
+        if p.kind == "linear drag":  # b/s, of a scale s of speeds
+            lack = np.hypot(0.01, 0.05) if p.of == "surge" else 0.01
+            assert np.sqrt(found[m]) == pytest.approx(lack)
 
 
 @pytest.mark.parametrize("health", spread([1.0, 0.5], [0.5], [1.0]))
