@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from rov_fmu.identify.beginning import load_tests
 from verification.identification.strangers import gates
 from verification.identification.strangers.drawn import draw
 from verification.identification.strangers.judge import Judged, JudgedAxis, Number, judged
@@ -61,6 +62,19 @@ def test_the_bench_tests_a_whole_thruster_and_nobody_measures_one_without_a_tabl
     assert f"about = {0.95 * assumed.body.full:.4g}" in (tmp_path / "none" / "rov.toml").read_text(encoding="utf-8")
 
 
+def test_places_beside_those_of_the_file_turn_the_vehicle_and_a_cut_log_is_read_in_two(tmp_path: Path) -> None:
+    given, moved, cut = (draw(7, 4, BY_NAME[name]) for name in ("as modelled", "places", "cut"))
+    effects, others = given.body.places, moved.body.places
+    assert np.array_equal(others[:3], effects[:3])
+    assert others[3] == pytest.approx([1.02 * effects[3, 0], 1.02 * effects[3, 1], 0.005, 0.0])
+    for drawn, name in ((given, "given"), (moved, "moved"), (cut, "cut")):
+        drawn.write(tmp_path / name)
+    told = [(tmp_path / name / "rov.toml").read_text(encoding="utf-8") for name in ("given", "moved")]
+    assert told[0] == told[1]
+    logs = load_tests(tmp_path / "cut").folder.logs
+    assert [log.file.partition(" (from")[0] for log in logs] == ["dive_0.csv"] * 2 + ["dive_1.csv"] * 2
+
+
 @pytest.mark.parametrize("name", ["lost lock", "frame of the earth", "unsettled velocity"])
 def test_a_sensor_that_is_wrong_for_a_while_is_right_in_between(name: str) -> None:
     wrong, right = draw(8, 2, BY_NAME[name]), draw(8, 2, AS_MODELLED)
@@ -76,7 +90,7 @@ def test_a_wrong_answer_counts_for_its_kind_and_its_quantity_and_not_among_what_
     wrong = replace(right, distance=0.2, numbers=(inside, late))
     folders = [
         Judged("a", "as modelled", 2, (right, right), (), 5.0),
-        Judged("b", "weak thruster", 2, (right,), (("health port", True), ("rotor lag", False)), 5.0),
+        Judged("b", "weak thruster", 2, (right,), (("weak thruster port", True), ("rotor lag", False)), 5.0),
         Judged("c", "crisis", 2, (wrong, replace(wrong, word="usable")), (("command limit", False),), 5.0),
         Judged("d", "crisis", 2, (wrong,), (), 5.0),
     ]

@@ -138,6 +138,9 @@ class Drawn:
                 shown = self.columns[axis][:, dive] + _NOISE[axis] * random.standard_normal(len(self.commands))
                 heads.append(HEADERS[axis])
                 values.append(np.degrees(shown) % 360.0 if axis == YAW else shown)
+            if self.kind.is_cut:
+                at = abs(values[0] - 0.5 * values[0][-1]) > 1.5
+                values = [column[at] for column in values]
             files[f"dive_{dive}.csv"] = _csv(heads, values)
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
@@ -198,6 +201,8 @@ def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
         loss=random.uniform(0.0, 0.15),
         lag=random.uniform(0.05, 0.2) * length,
         coupled=count == 4 or kind.has_hidden_sway,
+        reach=kind.reach,
+        ahead=kind.ahead,
     )
 
 

@@ -153,9 +153,9 @@ def _said(folder: Path) -> _Said:
 
 
 def _causes(result: Identification) -> Iterator[str]:
-    """Yield what is told with a probability."""
+    """Yield what is told with a probability, and thrusters that are told as weak."""
     for one in result.findings:
-        if any("probability" in sentence for sentence in result_sentences([one])):
+        if one.kind == "weak thruster" or any("probability" in sentence for sentence in result_sentences([one])):
             yield f"{one.kind} {one.words.get('of', '')}".strip()
 
 

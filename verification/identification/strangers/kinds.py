@@ -51,7 +51,7 @@ class Kind:
     """What the thrusters make of the commands that reach them."""
     shown: Shown = _as_it_is
     causes: str = "-"
-    """A regular expression of the causes that are true, each as its kind and what has it: `health port`."""
+    """A regular expression of the causes that are true, each as its kind and what has it: `neutral port`."""
     counts: tuple[int, ...] = (2, 4)
     """The numbers of axes of the vehicles that may be of this kind."""
     has_hidden_sway: bool = False
@@ -62,6 +62,11 @@ class Kind:
     """False if nobody measured the thrust: rov.toml says about how large it is, 5 % too little."""
     size: float = 1.0
     """Its mass relative to that of the others."""
+    reach: float = 1.0
+    ahead: float = 0.0
+    """Those of Body: where the thrusters are beside what rov.toml says."""
+    is_cut: bool = False
+    """True if each log lacks 3 s in its middle, so that it is read in two pieces."""
     group: str = "stranger"
     """`stranger`, `hidden` (no log can show it), or `law` (it obeys the equation)."""
 
@@ -266,6 +271,40 @@ def _weak(m: Moment, _: Body) -> None:
     m.gain[PORT] *= 0.55
 
 
+def _with_strength(share: float) -> Act:
+    """Return what makes port stronger or weaker than starboard, whose thrust is measured."""
+
+    def act(m: Moment, _: Body) -> None:
+        m.gain[PORT] *= share
+
+    return act
+
+
+def _slower(m: Moment, _: Body) -> None:
+    m.lag[PORT] *= 1.08
+
+
+def _fails(m: Moment, _: Body) -> None:
+    m.gain[PORT] *= np.where(m.clock > 60.0, 0.4, 1.0)
+
+
+def _near(m: Moment, b: Body) -> None:
+    m.gain[PORT] *= 1.012
+    m.lag[PORT] *= 1.04
+    m.drag *= np.where(m.velocity < 0.0, 1.02, 1.0)
+    m.drag += 0.02 * _squares(b, m.velocity) * m.velocity**2 / b.top[:, None]
+
+
+def _nearly(columns: dict[int, Array], random: np.random.Generator) -> None:
+    columns[YAW] = columns[YAW] + np.radians(0.4) * np.sin(columns[YAW])
+    for axis in (SURGE, SWAY):
+        if axis in columns:
+            swell = 0.006 * np.sin(
+                2.0 * np.pi * ROW * np.arange(len(columns[axis]))[:, None] / 6.0 + random.uniform(0.0, 6.0)
+            )
+            columns[axis] = 1.006 * columns[axis] + swell
+
+
 def _lost_blade(m: Moment, _: Body) -> None:
     m.gain[PORT] *= np.where(m.goal[PORT] < 0.0, 0.55, 0.85)
 
@@ -306,12 +345,12 @@ def _swapped(rows: Array) -> Array:
 
 AS_MODELLED = Kind("as modelled", "nothing else", group="law")
 FAULTS = (
-    Kind("weak thruster", "port has 55 % of its thrust", _weak, causes=r"health .*port", group="law"),
+    Kind("weak thruster", "port has 55 % of its thrust", _weak, causes=r"weak thruster .*port", group="law"),
     Kind(
         "weak, no table",
         "the same, and nobody measured the thrust",
         _weak,
-        causes=r"health .*port",
+        causes=r"weak thruster .*port",
         has_table=False,
         group="law",
     ),
@@ -397,6 +436,19 @@ KINDS = (AS_MODELLED, *FAULTS, *STRANGERS)
 OTHERS = (
     Kind("of 2 kg", "the others weigh 6 to 14 kg", size=0.2, group="law", counts=(4,)),
     Kind("of 100 kg", "the same", size=10.0, group="law", counts=(4,)),
+    Kind("unlike 0.94", "port has 94 % of its thrust", _with_strength(0.94), group="law"),
+    Kind("unlike 0.97", "port has 97 % of its thrust", _with_strength(0.97), group="law"),
+    Kind("unlike 1.03", "port has 103 % of its thrust", _with_strength(1.03), group="law"),
+    Kind("places", "arms are 2 % longer, and the lateral thruster 5 mm ahead", reach=1.02, ahead=0.005, group="law"),
+    Kind("cut", "each log lacks 3 s in its middle", is_cut=True, group="law"),
+    Kind(
+        "near",
+        "thrust 1.2 %, lags 4 %, drag 2 %, compass 0.4 degrees, DVL 0.6 % and a swell of 6 mm/s",
+        _near,
+        shown=_nearly,
+    ),
+    Kind("lags apart", "port is 8 % slower", _slower),
+    Kind("failing thruster", "port has 40 % of its thrust in the second dive", _fails),
     Kind("waves", "waves of 10 cm and 6 s carry it along", shown=_waved, counts=(4,)),
 )
 """Kinds that no seed draws by itself."""

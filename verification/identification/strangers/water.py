@@ -60,11 +60,17 @@ class Body:
     """s."""
     coupled: bool
     """True with Coriolis and Munk terms."""
+    reach: float = 1.0
+    """The arm of port and starboard relative to the one that rov.toml gives."""
+    ahead: float = 0.0
+    """How far the lateral thruster is ahead of the middle, which rov.toml gives, m."""
 
     @property
     def places(self) -> Array:
         """4 x 4: the effect of the force of each thruster along each axis."""
-        return np.asarray(DRIVEN * np.array([1.0, 1.0, 1.0, self.arm])[:, None])
+        effects = DRIVEN * np.array([1.0, 1.0, 1.0, self.reach * self.arm])[:, None]
+        effects[YAW, 2] = self.ahead
+        return np.asarray(effects)
 
     def goal(self, command: Array) -> Array:
         """Return the steady force at rest for each command, relative to that of full command."""
