@@ -195,6 +195,7 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         if any(axis.coefficient(key) not in tests.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
+    logs = [one if one.log.axis else one.with_thrust(values) for one in logs]
     known = Prior(
         layout,
         values,

@@ -40,7 +40,9 @@ def optional_effects(fit: Fit) -> Iterator[IdentifiedEffect]:
         is_usual = p.log is not None or p.of_kind.is_of_structure or (p.of_kind.is_usual_if_right and is_right)
         beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
         evidence, least = odds.get(n, posterior.evidence(n)), _shortest(fit, p)
-        yield IdentifiedEffect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
+        sensors = (m for one in fit.objective.logs for m in one.measured if with_same_lag(m.sensor) == p.part)
+        axes = frozenset(m.axis.name for m in sensors)
+        yield IdentifiedEffect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least, axes=axes)
 
 
 def _strengths(fit: Fit) -> Iterator[IdentifiedEffect]:

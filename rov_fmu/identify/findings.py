@@ -104,14 +104,14 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "many thrusters pulled together, and the battery"
         ),
         "unknown force": (
-            "{what} in {files}{since}. Nothing in the logs explains it. If it comes again in another log, it belongs "
+            "{what} in {files}. Nothing in the logs explains it. If it comes again in another log, it belongs "
             "to the vehicle"
         ),
         "beyond thrusters": (
             "{axes}: the logs have {largest} and the thrusters of rov.toml give {most} at full command. Check their "
             "thrust, directions and positions, and the units of the logs"
         ),
-        "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
+        "change of thrust": "{what} in {files}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
         "search ended": (
             "no cause that was tried explains the errors along any axis, so the search ended before all were tried. "
@@ -126,7 +126,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": (
-            "{what} in {files}{since}. Check for waves, a changing current, and a vehicle that touches something"
+            "{what} in {files}. Check for waves, a changing current, and a vehicle that touches something"
         ),
         "coupling left out": (
             "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
@@ -183,7 +183,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "idle voltage": (
             "no effect of the logged voltage ({volts} V) on the thrust is seen, so the vehicle does without it"
         ),
-        "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
+        "small disturbance": "{what} in {files}. It is small, and the intervals allow for it",
         "rocking": (
             "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no speed and no time is "
             "claimed to better than 3 %, and no stopping distance to better than 6 %"
@@ -659,11 +659,17 @@ def _on_points(result: AxisResult) -> Iterator[Finding]:
 
 
 def _on_forces(identification: Identification) -> Iterator[Finding]:
-    """Yield findings about tables of forces whose scale contradicts that of the logs."""
+    """Yield findings about tables of forces whose scale contradicts that of the logs.
+
+    Where the model is wrong along all axes of a curve, its forces make up for what it lacks, and tell no table.
+    """
+    layout = identification.vehicle.layout
+    pairs = ((t.curve, one.structure) for one in identification.axes for t in layout.thrusters_along(one.axis))
+    least = {curve: min(errors) for curve, errors in grouped(pairs).items()}
     told = [p for p in identification.forces if p.counts and p.measured * p.model > 0.0]
     for (curve, file), ratios in grouped(((p.subject, p.file), p.measured / p.model) for p in told).items():
         ratio = float(np.median(ratios))
-        if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
+        if least.get(curve, 0.0) <= USUAL and abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, words={"ratio": significant(ratio, 2)})
 
 
@@ -721,6 +727,8 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
     layout, description = identification.vehicle.layout, identification.folder.rov_file.description
     told = {p.subject for p in identification.forces} | ({*description.known} if description else set())
     for curve, known in identification.curves.items():
+        if description and curve not in description.layout.curves_by_name:
+            continue  # one that a thruster has by a hypothesis: it has the thrust of the one that it shared
         a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
         if a_t in {one.name for one in known} and not {curve, a_t} & told:
             yield Finding("assumed thrust", curve=curve)
@@ -754,8 +762,7 @@ def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     kind = d.slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
     where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
-    since = "" if d.since is None else f" from {d.since:.0f} s on"
-    return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since)
+    return about(d.file, kind, d.axis.name if d.axis else "", what=what)
 
 
 def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
@@ -806,7 +813,8 @@ def _on_search(identification: Identification) -> Iterator[Finding]:
 def _structure(structure: Structure) -> Finding | None:
     """Return the finding about a hypothesis that won; None where only its effect is told."""
     hypothesis, value, unit = HYPOTHESES[structure.kind], structure.value, structure.unit
-    if (kind := KINDS.get(structure.kind)) and abs(value - (kind.null or 0.0)) < hypothesis.least:
+    kind = KINDS.get(structure.kind)
+    if kind and abs(value - (1.0 if kind.is_ratio else kind.null or 0.0)) < hypothesis.least:
         return None
     size = percent(value) if unit == "1" else size_in_words(value, unit)
     words = {"of": structure.of, "value": size, **dict(structure.words)}

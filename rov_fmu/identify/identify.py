@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from rov_fmu.equation.catalogue import AXES, Axis
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
@@ -39,6 +39,7 @@ from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
@@ -159,7 +160,8 @@ def _axis(
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]
-    is_other = assess.differs(fit.objective.table, fit.ends, axis, tested)
+    concerned = {axis, *(COUPLED_AXES if vehicle.layout.coupled and axis in COUPLED_AXES else ())}
+    is_other = assess.differs(fit.ends, axis, tested)
     result = AxisResult(
         axis=axis,
         answers=answers,
@@ -171,7 +173,8 @@ def _axis(
         soon=fit.structure[axis].soon,
         disturbances=slow,
         effects=acting,
-        slips=[s for s in found.slips if s.file in files],
+        slips=[s for s in found.slips if s.file in files and _axis_of(s) in {None, *concerned}],
+        has_voltage=bool(tests.folder.voltages),
         misfits=misfits,
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
         alone=[*dict.fromkeys(file for file, _ in driving if file not in mixed)],
@@ -180,6 +183,12 @@ def _axis(
         difference=fit.difference if is_other else 0.0,
     )
     return replace(result, verdict=verdict(result))
+
+
+def _axis_of(slip: Slip) -> Axis | None:
+    """Return the axis that a mistake in a log concerns; None if it is none of a single quantity."""
+    quantity = QUANTITIES.get(slip.quantity)
+    return quantity.axis if quantity else None
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:

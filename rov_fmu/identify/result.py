@@ -267,6 +267,8 @@ class IdentifiedEffect:
     """The smallest value that the sampling shows."""
     beside: str = ""
     """The thruster to whose force that of this one is relative."""
+    axes: frozenset[str] = frozenset()
+    """The names of the axes whose sensors have it; empty if it is none of a sensor."""
 
     @property
     def rounded_evidence(self) -> float:
@@ -314,9 +316,6 @@ class Disturbance(IdentifiedEffect):
     """The log in which it is largest."""
     share: float
     """The value relative to the RMS of the thrust, or of the velocity, in that log."""
-    since: float | None = None
-    """From when on it exceeds twice its own uncertainty, s after the start of the log; None if it does so from the
-    start, or comes and goes."""
 
     @property
     def slow(self) -> Process:
@@ -520,7 +519,9 @@ class AxisResult:
     disturbances: Sequence[Disturbance] = ()
     effects: Sequence[IdentifiedEffect] = ()
     slips: Sequence[Slip] = ()
-    """The mistakes in the logs that show the axis."""
+    """The mistakes in the logs that show the axis, in what concerns it."""
+    has_voltage: bool = False
+    """True if a log has the voltage of the battery."""
     misfits: Sequence[str] = ()
     """The logs whose motors are not the thrusters along the axis."""
     inertia: float = inf
@@ -551,8 +552,9 @@ class AxisResult:
 
     @property
     def unusual(self) -> list[IdentifiedEffect]:
-        """The effects of unusual size."""
-        return [effect for effect in self.effects if effect.is_unusual]
+        """The effects of unusual size, but for those of the sensors of other axes."""
+        own = (effect for effect in self.effects if not effect.axes or self.axis.name in effect.axes)
+        return [effect for effect in own if effect.is_unusual]
 
     @property
     def main(self) -> Prediction | None:

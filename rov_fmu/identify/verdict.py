@@ -124,10 +124,14 @@ def _known(e: AxisResult, *of: str) -> dict[str, str]:
     return {"command": f"{answer.command:.0%}", "known": known}
 
 
+_ALONE = "Log this axis alone, both ways, each command for 8 s. If it is known there, the other axes disturb it here."
+
+
 def _apart(e: AxisResult) -> str:
     """Return how to tell an axis from what drives the vehicle at the same time."""
-    words = told_apart("it", first_of(e.mixed, MOST), e.alone, "log this axis alone")
-    return f"{capitalized(words)}." if e.mixed else ""
+    if not e.alone:
+        return _ALONE if e.mixed else ""
+    return f"{capitalized(told_apart('it', first_of(e.mixed, MOST), e.alone, ''))}." if e.mixed else ""
 
 
 def _unless_alone(words: str) -> Callable[[AxisResult], str]:
@@ -137,7 +141,8 @@ def _unless_alone(words: str) -> Callable[[AxisResult], str]:
 
 def _again(e: AxisResult) -> str:
     """Return how to see whether the largest unknown disturbance belongs to its log alone."""
-    voltage = ", with the voltage" if max(e.unknown, key=lambda d: d.share).changes_thrust else ""
+    is_gain = max(e.unknown, key=lambda d: d.share).changes_thrust
+    voltage = ", with the voltage" if is_gain and not e.has_voltage else ""
     return f"Log it again{voltage}. If that log is good, leave the axis out of this one by [leave_out] in rov.toml."
 
 
@@ -176,7 +181,7 @@ RULES = (
         "The predictions {reach}.",
         _reach,
         is_least=True,
-        remedy=_unless_alone("Log this axis alone, both ways, each command for 8 s."),
+        remedy=_unless_alone(_ALONE),
     ),
     Rule(
         "moving quantities for which no change is a better prediction",
@@ -286,7 +291,7 @@ RULES = (
         lambda e: len(e.slips),
         None,
         0.0,
-        "The {quantity} in {file} seems to have another unit or sign, and all axes are fitted to this log.",
+        "The {quantity} in {file} seems to have another unit or sign.",
         lambda e: {"quantity": e.slips[0].quantity, "file": e.slips[0].file},
         "1",
         remedy="Check the file; [columns] of rov.toml changes a unit or a sign.",

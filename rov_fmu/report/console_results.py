@@ -21,7 +21,7 @@ from rov_fmu.identify.findings import (
     with_error,
     with_lag,
 )
-from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
+from rov_fmu.identify.result import Answer, AxisResult, Identification, Tested, is_extrapolated, relative_error
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
@@ -59,16 +59,21 @@ def _answers(axes: Sequence[AxisResult]) -> Table:
     shown = table("What to expect, with 95% intervals", "", numbers)
     for result in axes:
         axis, half = result.axis, answer_at(result, 0.5)
-        cells = [_known(answer_at(result, share), "steady", axis.unit) for share in SHARES]
-        cells += [_known(half, "rise", "s"), _known(half, "stop", axis.position_unit)]
+        told = [(answer_at(result, share), "steady", axis.unit) for share in SHARES]
+        told += [(half, "rise", "s"), (half, "stop", axis.position_unit)]
+        cells = [_known(*one, result.tested) for one in told]
         tested = tested_in_words(result.tested).removeprefix("from ")
         shown.add_row(f"{axis.positive} ({axis.name})", tested, *cells)
-    shown.caption = STOPPING
+    shown.caption = f"{STOPPING} Numbers in brackets are for commands beyond the tested ones."
     return shown
 
 
-def _known(answer: Answer | None, part: str, unit: str) -> str:
-    return with_error(getattr(answer, part), unit) if answer else "-"
+def _known(answer: Answer | None, part: str, unit: str, tested: Tested) -> str:
+    """Return a number with its error, in brackets where the verdict does not judge it."""
+    if not answer:
+        return "-"
+    words = with_error(getattr(answer, part), unit)
+    return f"({words})" if is_extrapolated(answer.command, tested) else words
 
 
 def _errors(axes: Sequence[AxisResult]) -> Table:

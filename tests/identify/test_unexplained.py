@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total_information
 from rov_fmu.identify.result import KEPT
-from rov_fmu.identify.unexplained.disturbances import acting_since, disturbances, followed
+from rov_fmu.identify.unexplained.disturbances import disturbances, followed
 from rov_fmu.tank.arrays import Array
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN, TRUTH
@@ -97,19 +97,6 @@ def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
     assert not own.indices_of("force", "sway")
 
 
-@pytest.mark.parametrize(
-    ("start", "end", "since"),
-    [(13.7, 60.0, 20.7), (0.0, 60.0, None), (0.5, 60.0, None), (60.0, 60.0, None), (20.0, 40.0, None)],
-    ids=["a load taken at 13.7 s", "always", "nearly always", "never", "it comes and goes"],
-)
-def test_a_disturbance_acts_from_when_it_stays(start: float, end: float, since: float | None) -> None:
-    """A path also exceeds twice its uncertainty, or falls below it, by chance: here for 0.3 s in each 4 s. The samples
-    are a piece of a log that began 7 s before."""
-    time = np.arange(600) / 10.0
-    by_chance = (time % 4.0 < 0.3) & (time > 2.0)
-    assert acting_since(time, ((time >= start) & (time < end)) ^ by_chance, -7.0) == since
-
-
 @pytest.mark.long
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
     """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more.
@@ -146,7 +133,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
     for key, (size, usual, unit) in sizes.items():
         process = found[key]
         assert (process.value, process.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
-        assert (process.unit, process.since) == (unit, pytest.approx(30.0, abs=0.3) if size else None)
+        assert process.unit == unit
         index = objective.table.index(process.kind, process.of)
         assert index is not None
         gone = np.where(np.arange(len(z)) == index, objective.low, z)

@@ -108,12 +108,12 @@ def log(file: str, *, full: float = 0.0) -> Log:
 
 
 def disturbance(
-    kind: str, axis: Axis | None, file: str, size: float, unit: str, share: float, since: float | None, evidence: float
+    kind: str, axis: Axis | None, file: str, size: float, unit: str, share: float, evidence: float
 ) -> Disturbance:
     """Return a slow process with a size that is known within a tenth."""
     interval = 0.9 * size, 1.1 * size
     of = axis.name if axis else ""
-    return Disturbance(kind, of, kind, size, interval, unit, evidence, axis=axis, file=file, share=share, since=since)
+    return Disturbance(kind, of, kind, size, interval, unit, evidence, axis=axis, file=file, share=share)
 
 
 @cache
@@ -167,8 +167,8 @@ def without_findings() -> Identification:
             IdentifiedEffect("load", "heave", "constant load", 0.01, (-0.5, 0.5), "N", -3.0),
         ),
         disturbances=(
-            disturbance("slow force", HEAVE, FILES[1], 2.1, "N", 0.16, 41.0, 30.0),
-            disturbance("slow gain", None, FILES[0], 0.01, "1", 0.01, None, 2.0),
+            disturbance("slow force", HEAVE, FILES[1], 2.1, "N", 0.16, 30.0),
+            disturbance("slow gain", None, FILES[0], 0.01, "1", 0.01, 2.0),
         ),
         logging=(Logging(FILES[0], 0.1, -0.08, (-0.09, -0.07), 0.1), Logging(FILES[1], 0.1, 0.0, (-0.02, 0.02), 0.1)),
         sensors=(

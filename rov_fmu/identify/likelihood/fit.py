@@ -67,8 +67,9 @@ class Fit:
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
     """How much larger J is at the end of the second start; 0 if one was enough."""
-    ends: tuple[Array, Array]
-    """The coordinates at the ends of both starts, which are the same if one was enough."""
+    ends: tuple[tuple[Table, Array], tuple[Table, Array]]
+    """The coordinates at the ends of both starts, which are the same if one was enough, with the table of their fit:
+    that of the fit with hypotheses may have other parameters."""
     starts: Starts = field(default_factory=dict)
     """The hypotheses about the structure that won, with the coordinates of their rows."""
     odds: Mapping[Suspect, float] = field(default_factory=dict)
@@ -146,12 +147,12 @@ def fit_all(
         best = refined(full, near)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value
+    odds = search.odds
     apart = [
         abs(ends[-1].z[n] - ends[0].z[n]) / max(posterior.errors[n], _SAME * full.deviation[n])
-        for n in posterior.of_vehicle
+        for n in (() if odds else posterior.of_vehicle)  # other vehicles had the wrong structure
     ]
-    odds = search.odds
-    if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
+    if max(apart, default=0.0) < 2.0:
         difference = 0.0
     misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best, late=True)))
     ratios = {axis: one.widens for axis, one in misfits.items()}
@@ -165,7 +166,7 @@ def fit_all(
         posterior,
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
-        (ends[0].z, ends[-1].z),
+        ((quick.table, ends[0].z), (quick.table, ends[-1].z)),
         search.now.starts,
         odds,
         search.alike,

@@ -391,8 +391,9 @@ HYPOTHESES = {
         _files(lambda one: bool(one.lost) and not one.is_momentary),
         _in_logs(lambda known, one: one.with_lines(known.coefficients, known.full)),
         sentence=(
-            "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
-            "({rate} per second). Fly in MANUAL, or log at 50 Hz, which ArduSub's own log cannot"
+            "{of}: nearly each row has other commands. If they change between the rows ({rate} per second), about "
+            "{share} of the {axis} command is lost: log at 50 Hz, or fly without an autopilot (MANUAL). If they hold "
+            "until the next row, something else moves the vehicle, such as waves"
         ),
         in_words=_of_lost,
         changes_thrust=False,
@@ -405,6 +406,7 @@ HYPOTHESES = {
         (-0.4,),
         "thruster {of}: it has a curve of its own, with {value} of the thrust astern, relative to ahead, that others "
         "have{odds}. Check its propeller, its speed controller and the neutral of this",
+        least=0.05,  # a propeller that has lost nothing astern
         is_contrast=True,
     ),
     NEUTRAL: Hypothesis(

@@ -116,6 +116,18 @@ class SampledLog:
         """Return the log with other columns of its rows."""
         return replace(self, record=replace(self.record, **columns), thinned=replace(self.thinned, **columns))
 
+    def with_thrust(self, coefficients: Mapping[str, float]) -> "SampledLog":
+        """Return the log whose thrusters begin with the steady force of its first commands, with an error of its size:
+        what they got before is unknown."""
+        first = dict(zip(self.layout.inputs, self.record.inputs[0].tolist(), strict=True))
+        forces = self.vehicle(coefficients).commanded(self.layout.usual_inputs | first)
+        speeds = {f"n_{name}": first.get(f"u_{name}", 0.0) for name in forces}  # where these lag
+        start = {
+            state: value for state, value in ({f"F_{name}": F for name, F in forces.items()} | speeds).items() if value
+        }
+        errors = {state: max(abs(value), _CALM * state.startswith("F")) for state, value in start.items()}
+        return self._with_rows(start={**self.record.start, **start}, errors={**self.record.errors, **errors})
+
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
         assert not self.is_momentary

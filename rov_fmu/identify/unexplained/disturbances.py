@@ -15,15 +15,11 @@ from rov_fmu.identify.likelihood.posterior import Posterior, around
 from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.io.groups import grouped
-from rov_fmu.tank.arrays import Array, Flags, rms
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import held
 
 _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
-_PARTED = 0.9
-"""A slow process acts from some time on if at least this share of the samples shows nothing before, and it after."""
-_LATER = 1.0
-"""A slow process that is seen before this time, s, is taken to act from the start."""
 _STEPS = 8
 """The most derivatives of a fit without a slow process."""
 
@@ -119,7 +115,7 @@ def _disturbance(
     if not columns or (sampled.record.wanders and parameter.of == HORIZONTAL):
         return None
     axis = AXES.get(parameter.of)
-    states, deviations = run.states[:, columns], run.deviations[:, columns]
+    states = run.states[:, columns]
     acting, unit, usual = states, parameter.unit, 1.0
     if slow.acts_as == "gain":
         acting = np.expm1(states)
@@ -136,7 +132,6 @@ def _disturbance(
         ]
         usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
     size = float(np.sqrt(np.mean(np.sum(acting**2, axis=1))))
-    clear = np.any(np.abs(states) > 2.0 * deviations, axis=1)
     return Disturbance(
         parameter.kind,
         parameter.of,
@@ -148,18 +143,4 @@ def _disturbance(
         axis=axis,
         file=sampled.file,
         share=size / usual,
-        since=acting_since(time, clear, sampled.log.begin),
     )
-
-
-def acting_since(time: Array, clear: Flags, begin: float) -> float | None:
-    """Return from when on a slow process acts, s after the start of the log's file; None if it acts from the first of n
-    samples on, or comes and goes.
-
-    `clear` is true where it exceeds twice its own uncertainty, which it does now and then by chance. So the time counts
-    that parts the samples best into those without it and those with it.
-    """
-    right = np.append(0, np.cumsum(~clear)) + np.append(np.cumsum(clear[::-1])[::-1], 0)
-    first = int(np.argmax(right))
-    is_parted = first < len(time) and right[first] >= _PARTED * len(time)
-    return float(time[first] - begin) if is_parted and time[first] - time[0] >= _LATER else None

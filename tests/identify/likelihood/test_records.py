@@ -254,3 +254,24 @@ def test_a_dive_that_begins_in_motion_counts_from_when_its_velocity_is_known(
         assert (sampled.record.errors["u"] < 0.1) == is_measured
     short = replace(sampled.record, time=sampled.record.time[sampled.record.time < 4.0])  # half of it counts
     assert short.time[short.uncounted] - short.time[0] == pytest.approx(2.0 * is_unknown, abs=0.11)
+
+
+def test_thrusters_of_a_dive_that_begins_driven_begin_with_about_their_force() -> None:
+    """What they got before is unknown, so that its error is as large. Thrusters at rest stay certain."""
+    vehicle = without_surface(load_vehicle(SHIPPED["bluerov2"]))
+    driven = {**DRIVEN, "6": 0.0 * PUSH}
+    sampled = recorded(log(commands(TIME, driven), *TRACK, *moving("heading")), LAYOUT)
+    assert sampled
+    begun = sampled.with_thrust(vehicle.coefficients)
+    forces = vehicle.commanded(LAYOUT.usual_inputs | {f"u_{name}": float(c[0]) for name, c in driven.items()})
+    for record in (begun.record, begun.thinned):
+        for name, F in forces.items():
+            assert record.start.get(f"F_{name}", 0.0) == pytest.approx(F)
+            assert record.start.get(f"n_{name}", 0.0) == driven[name][0]
+            if F:
+                assert record.errors[f"F_{name}"] == pytest.approx(abs(F))
+                assert record.errors[f"n_{name}"] == pytest.approx(abs(driven[name][0]))
+        assert record.errors.get("F_6") == sampled.record.errors.get("F_6")
+        assert {k: v for k, v in record.start.items() if k[:2] not in ("F_", "n_")} == {
+            k: v for k, v in sampled.record.start.items() if k[:2] not in ("F_", "n_")
+        }

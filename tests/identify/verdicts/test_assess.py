@@ -13,6 +13,7 @@ from rov_fmu.identify.assess import answers, differs
 from rov_fmu.identify.assess import tested_commands as of_tests
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.kinds import LAG, LEAST_LAG
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -88,4 +89,28 @@ def test_two_vehicles_differ_only_along_the_axes_whose_answers_differ(fit: Fit) 
     other = fit.best.z.copy()
     for n, p in enumerate(table.parameters):
         other[n] += p.of == "heave" and p.kind in ("quadratic drag", "linear drag")
-    assert [differs(table, (fit.best.z, other), axis, (0.5, 0.5)) for axis in (HEAVE, YAW)] == [True, False]
+    ends = (table, fit.best.z), (table, other)
+    assert [differs(ends, axis, (0.5, 0.5)) for axis in (HEAVE, YAW)] == [True, False]
+    # The parameters of another fit may be others, in another order.
+    turned = replace(table, parameters=table.parameters[::-1])
+    assert not any(differs((ends[0], (turned, fit.best.z[::-1])), axis, (0.5, 0.5)) for axis in (HEAVE, YAW))
+
+
+def test_the_time_with_the_lag_contains_that_with_both_ends_of_the_lag(fit: Fit) -> None:
+    """Also where the lag ends at its bound, below which nothing changes, so that no derivative shows it."""
+    index = fit.objective.table.index(LAG)
+    assert index is not None
+    z = fit.best.z.copy()
+    z[index] = LEAST_LAG
+    lag = np.arange(len(z)) == index
+    posterior = Posterior(fit.objective.table, z, np.diag(np.where(lag, 0.05**2, 1e-10)))
+    vehicle, _ = fit.objective.table.model(z)
+    slower = vehicle.with_(**{c.coefficient("T"): float(posterior.ends(index)[2]) for c in vehicle.layout.curves})
+    (answer,) = answers((posterior,), HEAVE, vehicle, (0.5, 0.5), (0.3,))
+    (late,) = answers(
+        (replace(posterior, z=np.where(lag, posterior.ends(index)[2], z)),), HEAVE, slower, (0.5, 0.5), (0.3,)
+    )
+    assert answer.lagged
+    assert late.lagged
+    assert answer.lagged[1][0] <= answer.lagged[0] < late.lagged[0] <= answer.lagged[1][1] * (1.0 + 1e-9)
+    assert answer.rise[1][1] < 1.01 * answer.rise[0], "the time without the lag is known"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.identify.identify import _axis_of
 from rov_fmu.identify.result import AxisResult, IdentifiedEffect, MeasuredPoint, Slip, score_of
 from rov_fmu.identify.verdict import RULES, WORDS, verdict
 from tests.report import results
@@ -16,7 +17,7 @@ from tests.report import results
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
 WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
 SLOW = IdentifiedEffect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
-FORCE = results.disturbance("slow force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
+FORCE = results.disturbance("slow force", SURGE, "log.csv", 1.0, "N", 0.06, 9.0)
 
 
 def point(off: float) -> MeasuredPoint:
@@ -67,9 +68,15 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
             "do not use",
-            "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
+            "The depth in log.csv seems to have another unit or sign.",
         ),
         ({"effects": [replace(SLOW, beyond=0.96)]}, "good", ""),
+        ({"effects": [replace(SLOW, axes=frozenset({"surge"}))]}, "good", ""),
+        (
+            {"effects": [replace(SLOW, axes=frozenset({"heave"}))]},
+            "usable",
+            "The time constant of the thrusters (0.60 s) is unusual.",
+        ),
         ({"effects": [SLOW]}, "usable", "The time constant of the thrusters (0.60 s) is unusual."),
     ],
 )
@@ -86,7 +93,7 @@ def test_what_was_done_already_is_not_asked_for_again() -> None:
     frequent = (replace(DEPTH, time=np.arange(len(DEPTH.time)) / 20.0),)
     leave = "eave it out of a.csv and b.csv by [leave_out] in rov.toml"
     assert [verdict(one).remedy for one in (doubtful, alone, apart)] == [
-        f"Log this axis alone, and l{leave}.",
+        "Log this axis alone, both ways, each command for 8 s. If it is known there, the other axes disturb it here.",
         f"L{leave}, because it is alone in c.csv.",
         "Log at 20 Hz or more, with steps of the command from rest.",
     ]
@@ -96,6 +103,20 @@ def test_what_was_done_already_is_not_asked_for_again() -> None:
         assert then.remedy == f"L{leave}, because it is alone in c.csv."
     done = verdict(replace(apart, predictions=frequent))
     assert (done.word, done.remedy) == ("usable", "")
+
+
+def test_the_voltage_is_asked_for_where_the_thrust_changes_and_no_log_has_it() -> None:
+    gain = replace(FORCE, kind="slow gain", axis=None, value=0.06, unit="1")
+    ask = [
+        verdict(AxisResult(HEAVE, **USUAL, disturbances=[one], has_voltage=has_voltage)).remedy
+        for one, has_voltage in ((gain, False), (gain, True), (FORCE, False))
+    ]
+    assert ["with the voltage" in remedy for remedy in ask] == [True, False, False]
+
+
+def test_a_mistake_in_a_quantity_concerns_its_axis_and_one_in_a_frame_all() -> None:
+    found = [_axis_of(Slip("a.csv", name, "is it in cm", 9.0)) for name in ("depth", "yaw velocity", "frame")]
+    assert found == [HEAVE, YAW, None]
 
 
 def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
