@@ -10,6 +10,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import QUADRATIC_DRAG, Drags, Motions
+from rov_fmu.identify.likelihood.kinds import LAG
 from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
@@ -124,12 +125,12 @@ def logarithms(
     return of
 
 
-def differs(table: Table, ends: Sequence[Array], axis: Axis, tested: Tested) -> bool:
+def differs(ends: Sequence[tuple[Table, Array]], axis: Axis, tested: Tested) -> bool:
     """Return True if coordinates belong to vehicles whose answers within the tests differ along an axis."""
     commands = [c for c in commands_of_answers(tested) if not is_extrapolated(c, tested)]
     if not commands:
         return False
-    one, other = (logarithms(table, axis, commands)(z[:, None]).reshape(-1, 3) for z in ends)
+    one, other = (logarithms(table, axis, commands)(z[:, None]).reshape(-1, 3) for table, z in ends)
     return bool(np.any(np.abs(one - other) > _DIFFERENT))
 
 
@@ -154,7 +155,8 @@ def answers(
     interval reaches as far to either side of the value as this drag changes the answer.
 
     The lag and the time without it share what the tests tell about their sum, so the interval of the time with the lag
-    is its own. Thrusters beside logs with a wrench have none: no test shows their lag.
+    is its own, and contains the times with both ends of that of the lag. Thrusters beside logs with a wrench have none:
+    no test shows their lag.
     """
     curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
     with_lag = not pushes and any(curve.has_lag for curve in curves)
@@ -178,6 +180,12 @@ def answers(
         half = np.minimum(QUANTILE * np.sqrt(variances), _WIDEST_HALF)
         half = np.maximum(half, least * _BY_DRAG[: half.shape[1]])
         ends += [middle - half, middle + half, own - misfit, own + misfit]
+        # Where a lag is at its bound, no derivative shows it.
+        if (lag := posterior.table.index(LAG)) is not None:
+            for end in posterior.ends(lag)[1:]:
+                z = posterior.z.copy()
+                z[lag] = end
+                ends.append(fitted(posterior.table, z))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
     return _finite(axis, commands, of_file, low, high)
