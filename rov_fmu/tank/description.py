@@ -8,6 +8,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import copysign, cos, hypot, radians, sin
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,7 +26,7 @@ from rov_fmu.equation.catalogue import (
     YAW,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Part, VehicleAxis
+from rov_fmu.equation.parts import FAINT, Part, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
@@ -56,6 +57,8 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
+_GEOMETRY = f"[geometry] of {ROV_FILE}"
+"""The source of the directions and places of the thrusters of a base that the file corrects."""
 DRAFTED = "A vehicle identified from {}"
 """The description that a draft has, with its source."""
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs", "point")
@@ -135,6 +138,43 @@ class Requests(Strict):
         return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll angle", "pitch angle") * self.attitude}
 
 
+_Distance = Annotated[Finite, rule("must be from 0.001 to 10 m", lambda x: 0.001 <= x <= 10.0)]
+
+
+class Geometry(Strict):
+    """The table [geometry]: how the thrusters of a base that push ahead and sideways stand on this vehicle."""
+
+    angle: Annotated[Finite, rule("must be between 0 and 90 deg", lambda angle: 0.0 < angle < 90.0)] | None = None
+    """From ahead or astern, deg."""
+    x: _Distance | None = None
+    """How far they are ahead or astern of the centre of mass, m."""
+    y: _Distance | None = None
+    """The same to either side."""
+
+    def placed(self, layout: Layout) -> Layout:
+        """Return the layout of a base with these, where they are given. Each thruster keeps its signs."""
+
+        def own(t: Thruster) -> Thruster:
+            X, Y, Z = t.direction.value
+            if t not in vectored(layout):
+                return t
+            if self.angle is not None:
+                ahead, across = hypot(X, Y) * cos(radians(self.angle)), hypot(X, Y) * sin(radians(self.angle))
+                t = replace(t, direction=SourcedVector((copysign(ahead, X), copysign(across, Y), Z), _GEOMETRY))
+            if t.position and not self.x is self.y is None:
+                x, y, z = t.place
+                place = copysign(self.x or x, x), copysign(self.y or y, y), z
+                t = replace(t, position=SourcedVector(place, _GEOMETRY))
+            return t
+
+        return replace(layout, thrusters=tuple(map(own, layout.thrusters)))
+
+
+def vectored(layout: Layout) -> list[Thruster]:
+    """Return the thrusters that push both ahead and sideways."""
+    return [t for t in layout.thrusters if min(map(abs, t.direction.value[:2])) > FAINT]
+
+
 def _check_files(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
     """Check that a dive has several files, which are in the folder of rov.toml."""
     if len({*names}) < 2:
@@ -209,6 +249,7 @@ class RovTables(Tables):
     against: Any = None
     limits: Any = None
     fit: Requests = Requests()
+    geometry: Geometry | None = None
     priors: dict[str, _Deviation] = Field(default={})
     """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
     columns: dict[str, str] = Field(default={})
@@ -371,6 +412,8 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
     unused += [name for name in ("surface", "current", "waves") if name in data]
     reason = "identification does not use it. Add it to the identified vehicle file instead"
     yield from (key_line(place, reason) for place in unused)
+    if file.geometry and "base" not in data:
+        yield key_line("geometry", "is only allowed with base: write direction and position into [[thruster]]")
     if "base" in data:
         for name in present:
             own = {*data[name]} - {"coupling"} if name == "body" and isinstance(data[name], dict) else {name}
@@ -402,6 +445,8 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
     start = base.layout if base else _start(file)
     if base and file.body:
         start = replace(start, coupled=file.body.coupling)
+    if base and file.geometry:
+        start = file.geometry.placed(start)
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys)

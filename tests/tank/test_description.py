@@ -38,6 +38,35 @@ from tests.tank.readers.motion import DIVE, THRUSTERS, TIME
 from tests.tank.test_description_mistakes import LIMITS
 
 DOCS = Path(__file__).parents[2] / "docs"
+VECTORED_DIVE = "\n".join(
+    ["time [s],1 [%],2 [%],3 [%],4 [%],5 [%],6 [%],depth [m]"]
+    + [
+        f"{0.1 * n},0,0,0,0,{40 * (n % 40 > 20)},{40 * (n % 40 > 20)},{2 + 0.5 * np.sin(0.1 * n):.3f}"
+        for n in range(200)
+    ]
+)
+
+
+def test_the_owner_may_correct_the_geometry_of_a_base_that_a_draft_tells(tmp_path: Path) -> None:
+    """Each vectored thruster keeps its signs, and the others stay where they are."""
+    base = load_vehicle(SHIPPED["bluerov2"]).layout
+    own = "[geometry]\nangle = 40\nx = 0.16\n"
+    tests = read(tmp_path, f'base = "bluerov2"\n{HEAD}{own}', {"dive.csv": VECTORED_DIVE})
+    for before, now in zip(base.thrusters, tests.layout.thrusters, strict=True):
+        (X, Y, Z), (x, y, z) = now.direction.value, now.place
+        if before.name in "56":
+            assert now == before
+            continue
+        assert np.degrees(np.arctan2(abs(Y), abs(X))) == pytest.approx(40.0)
+        assert np.hypot(X, Y) == pytest.approx(1.0)
+        assert np.sign([X, Y, x, y]).tolist() == np.sign([*before.direction.value[:2], *before.place[:2]]).tolist()
+        assert (abs(x), y, z, Z) == (0.16, *before.place[1:], 0.0)
+        assert now.direction.source == now.position.source == "[geometry] of rov.toml"
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "dive.csv").write_text(VECTORED_DIVE, encoding="utf-8")
+    assert main(["inspect", "--draft", str(tmp_path / "other" / "dive.csv")]) == 0
+    draft = (tmp_path / "other" / ROV_FILE).read_text(encoding="utf-8")
+    assert "# angle = 45   # degrees from ahead or astern\n# x = 0.156   # m ahead" in draft
 
 
 # ---- What is about known, and what is reversed -----------------------------------------------------------------------

@@ -63,6 +63,12 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         {},
         " | ".join(f"/rov.toml: {name}: is not allowed together with base" for name in ("body", "curves", "thruster")),
     ),
+    (f"{HEAD}[geometry]\nangle = 40\n", HEAVE_ALONE, "/rov.toml: geometry: is only allowed with base: write direction"),
+    (
+        f'base = "bluerov2"\n{HEAD}[geometry]\nangle = 90\nx = 0\n',
+        HEAVE_ALONE,
+        "/rov.toml: geometry.angle = 90: must be between 0 and 90 deg | /rov.toml: geometry.x = 0: must be from 0.001",
+    ),
     (
         f"{HEAD}[curves.t200]\n",
         HEAVE_ALONE,

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import atan2, degrees, inf, isfinite
 from pathlib import Path
 
 import tomlkit
@@ -13,7 +13,7 @@ from rov_fmu.equation.parts import SourcedVector
 from rov_fmu.io.messages import brief, first_of, listed, one_line
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
-from rov_fmu.tank.description import DRAFTED
+from rov_fmu.tank.description import DRAFTED, vectored
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection
 from rov_fmu.tank.inspection.outputs import GUESSED, NOTHING_MOVED, RADIUS, Moved
@@ -23,7 +23,7 @@ from rov_fmu.vehicle.description import why_no_identifier
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-_HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "known")
+_HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "geometry", "known")
 """The tables and keys of a draft that describe the vehicle. A rov.toml that has a vehicle needs none of them."""
 
 
@@ -72,6 +72,7 @@ def draft(
     """
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     vehicle = load_vehicle(SHIPPED[likely.base]) if likely.base else None
+    some = vectored(vehicle.layout) if vehicle else []
     names = one_line(brief(", ".join(dict.fromkeys(one.path.name for one in inspections))))
     columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
     return render(
@@ -96,6 +97,8 @@ def draft(
         signals={row.name for one in inspections for row in one.channels},
         body=[*BODY, *ARM],
         vehicle=vehicle,
+        vectored=some,
+        angle=degrees(atan2(*map(abs, some[0].direction.value[1::-1]))) if some else 0.0,
         columns=columns,
         headers=_questions(headers),
         fields=_questions(_fields(inspections)),

@@ -18,6 +18,7 @@ import pytest
 
 import rov_fmu
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.parts import SourcedVector, Thruster
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import optional_effects
 from rov_fmu.identify.identify import identify
@@ -34,7 +35,17 @@ from rov_fmu.identify.likelihood.hypotheses import (
     in_order,
     twins,
 )
-from rov_fmu.identify.likelihood.kinds import KINDS, NEUTRAL, OWN_CURVE, POWER, POWER_ASTERN, STRENGTH, TURN
+from rov_fmu.identify.likelihood.kinds import (
+    DIRECTION,
+    KINDS,
+    NEUTRAL,
+    OWN_CURVE,
+    POWER,
+    POWER_ASTERN,
+    SHIFT,
+    STRENGTH,
+    TURN,
+)
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledLog, beside_lines, lost_between_rows
@@ -61,7 +72,7 @@ from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank import log as tank_log
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, without_surface
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.folders import HEAD, folder_of
 from tests.often import spread
 from tests.vehicles import VIDEORAY
@@ -100,6 +111,8 @@ class Fault:
     """The factor of the inertia."""
     turned: float = 0.0
     """How far the velocity sensor is turned to starboard, rad."""
+    angle: float = 0.0
+    """Vectored thrusters push at this angle from ahead, rad, and all are 5 mm ahead of their places; 0: as given."""
 
 
 def faults(names: list[str]) -> dict[str, Fault]:
@@ -159,6 +172,16 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     if fault.inertia != 1.0:
         names_of = [axis.coefficient("beta") for axis in whole.layout.bare_axes]
         whole = whole.with_(**{name: whole[name] / fault.inertia for name in names_of})
+    if fault.angle:
+        g_u, g_v = np.array([np.cos(fault.angle), np.sin(fault.angle)]) / np.sqrt(0.5)
+
+        def moved(t: Thruster) -> Thruster:
+            (X, Y, Z), (x, y, z) = t.direction.value, t.place
+            along = SourcedVector((g_u * X, g_v * Y, Z), "")
+            return replace(t, direction=along, position=SourcedVector((x + 0.005, y, z), ""))
+
+        layout = replace(whole.layout, thrusters=tuple(map(moved, whole.layout.thrusters)))
+        whole = rov_fmu.load(replace(Vehicle(whole.layout, whole.coefficients), layout=layout))
     if fault.rotor_lag:
         whole = with_rotors(whole, fault.rotor_lag)
     acting = fault.acting(logged)
@@ -1062,6 +1085,22 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
 @pytest.mark.parametrize("health", [0.0, 0.94])
 def test_a_thruster_that_is_dead_or_a_little_weaker_is_told(health: float, tmp_path: Path) -> None:
     check(tmp_path, "videoray", Fault("", "l", health), 1, 1)
+
+
+@pytest.mark.long
+def test_the_angle_and_the_places_of_thrusters_are_told_and_written(tmp_path: Path) -> None:
+    found = identify(load_tests(folder(tmp_path, "bluerov2", Fault("", angle=np.radians(41.0)), 1, 2)))
+    assert {axis.verdict.word for axis in found.axes} == {"good"}
+    told = {one.kind: one for one in found.effects if one.kept and one.kind in (DIRECTION, SHIFT)}
+    for kind, truth in ((DIRECTION, np.radians(41.0)), (SHIFT, 0.005)):
+        low, high = told[kind].interval
+        assert low <= truth <= high
+    for before, now in zip(
+        load_vehicle(SHIPPED["bluerov2"]).layout.thrusters, found.vehicle.layout.thrusters, strict=True
+    ):
+        X, Y, Z = now.direction.value
+        assert abs(Z) == 1.0 or np.degrees(np.arctan2(abs(Y), abs(X))) == pytest.approx(41.0, abs=0.5)
+        assert now.place[0] - before.place[0] == pytest.approx(0.005, abs=0.0015)
 
 
 @pytest.mark.long
