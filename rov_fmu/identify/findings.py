@@ -122,7 +122,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "moment), and is the likely cause. {coupling}{apart}"
         ),
         "weak thruster": (
-            "thruster {of}: it has {share} of the force of {other} ({low} to {high}). Check both for weed and damage"
+            "thruster {of}: it has {share} of the force of thruster {other} ({low} to {high}). Check both for weed and "
+            "damage"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": (
@@ -179,7 +180,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
     },
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
-        "strength": "thruster {of}: it has {share} of the force of {other} ({low} to {high})",
+        "strength": "thruster {of}: it has {share} of the force of thruster {other} ({low} to {high})",
         "idle voltage": (
             "no effect of the logged voltage ({volts} V) on the thrust is seen, so the vehicle does without it"
         ),

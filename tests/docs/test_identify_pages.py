@@ -111,7 +111,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
 def test_every_reason_of_a_verdict_is_told_with_what_to_do() -> None:
     table = (DOCS / "identify-verdicts.md").read_text("utf-8")
     told = [row.split(" …")[0] for row in re.findall(r"^\| ([A-Z].*?) \|", table, re.MULTILINE)]
-    found = [results.disturbance(kind, HEAVE, "log.csv", 1.0, "N", 0.1, None, 9.0) for kind in SLOW]
+    found = [results.disturbance(kind, HEAVE, "log.csv", 1.0, "N", 0.1, 9.0) for kind in SLOW]
     of_disturbances = [acting(one).capitalize() for one in found]
     reasons = [*(rule.sentence for rule in RULES if rule.sentence[0] != "{"), *of_disturbances]
     assert len(reasons) > len(told) > 0

@@ -195,13 +195,13 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "weak thruster",
         quiet(effects=(STRENGTH,)),
-        "thruster stbd: it has 80% of the force of port (79% to 81%). Check both for weed and damage",
+        "thruster stbd: it has 80% of the force of thruster port (79% to 81%). Check both for weed and damage",
         quiet(effects=(replace(STRENGTH, value=0.91),)),
     ),
     (
         "strength",
         quiet(effects=(replace(STRENGTH, value=0.971, interval=(0.968, 0.974)),)),
-        "thruster stbd: it has 97.1% of the force of port (96.8% to 97.4%)",
+        "thruster stbd: it has 97.1% of the force of thruster port (96.8% to 97.4%)",
         quiet(effects=(replace(STRENGTH, value=0.971, evidence=5.0),)),
     ),
     ("coupling", structured(Structure("coupling", "", 0.999, 1.0)), "a motion along one turns or moves", quiet()),
