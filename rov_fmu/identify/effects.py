@@ -51,20 +51,16 @@ def _strengths(fit: Fit) -> Iterator[IdentifiedEffect]:
     Only such a ratio is told, because how strong all of them are together hardly changes the motion. The other one is
     the middle one of those that push along the same axes, so that one that is ill has a ratio to a whole one.
     """
-    table = fit.posterior.table
-    rows = {t.name: n for t in table.layout.thrusters if (n := table.index(STRENGTH, t.name)) is not None}
-    of_type = grouped((table.shared(curve.name), name) for name, curve in table.layout.curve_of.items() if name in rows)
-    for same in of_type.values():
-        groups = list[set[str]]()
-        for axis in (axis for axis in fit.known.fitted if axis not in (ROLL, PITCH)):
-            own = {t.name for t in table.layout.thrusters_along(axis)} & {*same}
-            touched = [group for group in groups if group & own]
-            groups = [*(group for group in groups if not group & own), own.union(*touched)]
-        for group in filter(None, groups):
-            *_, other = sorted(group, key=lambda name: fit.file.posterior.z[rows[name]])[: len(group) // 2 + 1]
-            for name in same:
-                if name in group - {other} and not table.parameters[rows[name]].is_fixed:
-                    yield _strength(fit, name, other, rows[name], rows[other])
+    table, level = fit.posterior.table, [axis for axis in fit.known.fitted if axis not in (ROLL, PITCH)]
+    rows = {t.name: table.index(STRENGTH, t.name) for t in table.layout.thrusters}
+    free = {name: n for name, n in rows.items() if n is not None and not table.parameters[n].is_fixed}
+    along = {name: {a for a in level for t in table.layout.thrusters_along(a) if t.name == name} for name in free}
+    types = {name: table.shared(table.layout.curve_of[name].name) for name in free}
+    for name, n in free.items():
+        alike = [other for other in free if types[other] == types[name] and along[other] & along[name]]
+        middle = sorted(alike, key=lambda one: fit.file.posterior.z[free[one]])[len(alike) // 2 :]
+        if middle and middle[0] != name:
+            yield _strength(fit, name, middle[0], n, free[middle[0]])
 
 
 def _strength(fit: Fit, name: str, other: str, n: int, m: int) -> IdentifiedEffect:
