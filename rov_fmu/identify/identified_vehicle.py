@@ -203,7 +203,10 @@ def _rounded(vehicle: Vehicle, digits: int) -> Vehicle:
         return Estimated(error=short(row.error), correlation=correlation)
 
     def vector(one: SourcedVector | None) -> Any:
-        return SourcedVector(tuple(map(short, one.value)), one.source) if one and one.source.endswith(ADAPTED) else one
+        if one is None or not one.source.endswith(ADAPTED):
+            return one
+        x, y, z = map(short, one.value)
+        return SourcedVector((x, y, z), one.source)
 
     thrusters = (
         replace(t, direction=vector(t.direction), position=vector(t.position)) for t in vehicle.layout.thrusters

@@ -61,6 +61,7 @@ def test_the_owner_may_correct_the_geometry_of_a_base_that_a_draft_tells(tmp_pat
         assert np.hypot(X, Y) == pytest.approx(1.0)
         assert np.sign([X, Y, x, y]).tolist() == np.sign([*before.direction.value[:2], *before.place[:2]]).tolist()
         assert (abs(x), y, z, Z) == (0.16, *before.place[1:], 0.0)
+        assert now.position
         assert now.direction.source == now.position.source == "[geometry] of rov.toml"
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "dive.csv").write_text(VECTORED_DIVE, encoding="utf-8")

@@ -259,11 +259,12 @@ class Objective:
         """Return J of a vehicle whose thrusters, by their names, surely have these directions and places.
 
         It is a copy where they were certain before."""
-        now = {t.name: {"direction": t.direction, "position": t.position} for t in thrusters}
+        now = {t.name: t for t in thrusters}
 
         def changed(layout: Layout) -> Layout:
-            placed = tuple(replace(t, **now[t.name]) for t in layout.thrusters)
-            return replace(layout, thrusters=placed, is_uncertain=False)
+            pairs = ((t, now[t.name]) for t in layout.thrusters)
+            placed = (replace(t, direction=own.direction, position=own.position) for t, own in pairs)
+            return replace(layout, thrusters=tuple(placed), is_uncertain=False)
 
         found = copy(self)
         if not self.table.layout.is_uncertain:
