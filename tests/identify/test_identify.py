@@ -137,6 +137,7 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     assert vehicle.command_range == (0.2, 0.8)
 
 
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of what no test told
 def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> None:
     base = load_vehicle(REFIT)
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
@@ -264,6 +265,7 @@ def of_logs(identified: Identified) -> Identification:
     return identified("logs of heave", tests)
 
 
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of what no test told
 def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: Path) -> None:
     (heave,) = of_logs.axes
     check_answers(heave, 0.03)
