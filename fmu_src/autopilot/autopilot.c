@@ -42,7 +42,7 @@ typedef struct {
 
 /* What the filters and integrators of an axis contain. */
 typedef struct {
-    double target, error, slope, integral, last, before, slow, rate, wanted, demand, carry, mode;
+    double target, error, slope, integral, last, before, slow, rate, wanted, demand, carry, begun, mode;
 } loop_state;
 
 /* What the sensors tell: the position and Euler angles; the velocity through the water and the turn rates along the body's axes; the
@@ -129,7 +129,7 @@ static double loop_step(const loop_gains *k, loop_state *s, double wanted, doubl
     s->error += change;
     s->slope += passed(k->f_target, h) * (change / h - s->slope);
     s->integral = limited(s->integral + k->k_i * s->error * h, k->i_max);
-    const double speeding = limited((wanted - s->wanted) / h, k->brake);
+    const double speeding = (1.0 - s->begun) * limited((wanted - s->wanted) / h, k->brake);
     s->rate = rate;
     s->wanted = wanted;
     return k->k_p * s->error + s->integral + k->k_d * s->slope + k->k_ff * target + (k->d_1 + k->d_2 * fabs(wanted)) * wanted +
@@ -290,7 +290,9 @@ static void autopilot_step(const loop_gains gains[AXES], const sharing *share, l
             const double asked = k->most > 0.0 ? k->most * aim[a] : aim[a];
             s->demand += (asked - s->demand) / (share->stick_time > 0.0 ? 1.0 + share->stick_time / h : 1.0);
         } else {
-            const double wanted = mode[a] == PLACE ? rate_for(off[a], k, a >= ROLL_AXIS) : aim[a];
+            double wanted = mode[a] == PLACE ? rate_for(off[a], k, a >= ROLL_AXIS) : aim[a];
+            s->begun = begins && k->handover > 0.0 ? 1.0 : s->begun / (1.0 + 2.0 * h / fmax(k->handover, h));
+            wanted += s->begun * (rate[a] - wanted); /* the rate that there is fades away first, so that the integrator has nothing to do */
             double asked = loop_step(k, s, wanted, rate[a], h, begins);
             if (k->handover > 0.0) { /* what was demanded before fades away, so that nothing jumps */
                 s->carry = begins ? s->demand - asked : s->carry / (1.0 + h / k->handover);

@@ -3,23 +3,28 @@
 For each axis that the thrusters can push: v* = sat(k_x (x* - x)), braked so that the aim is reached without overshoot,
 and tau = k_p (v* - v) + k_i ∫(v* - v) dt + d_1 v* + d_2 |v*| v* + M dv*/dt + bias. The bandwidth of the rate loop is
 
-    k_v = 1/(2.5 (T + T_d + delay + 2.5 h)),   k_p = k_v M,   k_i = k_v^2 M/4,   k_x = k_v/3,
+    k_v = 1/(2 (T + T_d) + 2.5 (delay + 2.5 h)),   k_p = k_v M,   k_i = k_v^2 M/4,   k_x = k_v/3,
 
 with the inertia M with added mass, the lag T and the dead time T_d of the thrusters, the delay of the sensors, and the
 step h of the controller. With 2.5 h in it, a loop in which all exchange their values at once (Jacobi) stays calm up to
 100 ms. It is at most 3/s for translations and 8/s for turns, because vehicle files without a lag would allow any.
+
+Where a hold begins, v* fades in from the measured velocity within 1/k_v, without M dv*/dt: the demand does not jump,
+and the integrator has nothing to make up for, which would be an overshoot later.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.autopilot.allocation import allocation_matrix, thrust_rows
-from rov_fmu.autopilot.law import AXES, LOOP, Sharing, pulse_of
+from rov_fmu.autopilot.law import AXES, LOOP, OWN_GAINS, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
-from rov_fmu.io.messages import InputError, listed
+from rov_fmu.io.messages import InputError, listed, only
+from rov_fmu.io.numbers import GAIN_VALUES, NUMBERS
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -64,6 +69,20 @@ class Autopilot:
     def gain(self, axis: Axis, name: str) -> float:
         """Return a number of an axis."""
         return float(self.loops[name][AXES.index(axis)])
+
+    def with_gains(self, gains: Mapping[str, float]) -> "Autopilot":
+        """Return the autopilot with other gains, by the names of the parameters of its FMU, such as `k_p_w`.
+
+        Raises InputError about a name or a number.
+        """
+        loops = self.loops.copy()
+        places = {f"{name}_{axis.velocity}": (name, AXES.index(axis)) for axis in self.axes for name in OWN_GAINS}
+        for key, value in gains.items():
+            if key not in places:
+                raise InputError(f"gains: there is no {key}{only(key, places)}")
+            name, n = places[key]
+            loops[name][n] = (NUMBERS if name == "bias" else GAIN_VALUES).checked(f"gains: {key}", value)
+        return replace(self, loops=loops)
 
 
 def autopilot_of(vehicle: Vehicle, step: float = STEP, delay: float = DELAY) -> Autopilot:
@@ -129,7 +148,7 @@ def _loop(vehicle: Vehicle, axis: Axis, sharing: Sharing, lag: float, step: floa
     most = min(np.abs(np.sort(along[:, np.newaxis] * ends, axis=1).sum(axis=0)))
     alone = vehicle.motions(vehicle.layout.usual_inputs, (axis,))[0]
     d_1, d_2 = alone.B * inertia, alone.A * inertia
-    k_v = min(1.0 / (2.5 * (lag + delay + 2.5 * step)), _FASTEST[axis.is_rotation])
+    k_v = min(1.0 / (2.0 * lag + 2.5 * (delay + 2.5 * step)), _FASTEST[axis.is_rotation])
     loop["k_x"], loop["k_p"], loop["k_i"] = k_v / 3.0, k_v * inertia, k_v**2 * inertia / 4.0
     loop["d_1"], loop["d_2"], loop["inertia"], loop["bias"] = d_1, d_2, inertia, -alone.C * inertia
     loop["most"] = loop["i_max"] = most

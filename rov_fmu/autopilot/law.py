@@ -40,12 +40,14 @@ GAINS: Mapping[str, str] = {
     **dict.fromkeys(("f_a", "f_target", "f_error", "f_sensor", "f_demand"), "frequency of a filter, Hz"),
 }
 """The numbers of an axis, `loop_gains` of the C, with their meaning. 0 is none."""
+OWN_GAINS = tuple(GAINS)[: tuple(GAINS).index("k_a")]
+"""The numbers of an autopilot in SI units, which its owner may change. The others are those of ArduSub's loops."""
 LOOP = np.dtype([(name, np.float64) for name in GAINS])
 THRUSTER = np.dtype([("of_axis", "f8", 6), ("to_axis", "f8", 6), ("row", "f8"), ("rows", "f8")])
 _HEAD = ("thrusters", "rows", "commands", "scales", "steps", "attitude", "stick_time", "neutral", "ahead", "astern")
 SHARING = np.dtype([*((name, "f8") for name in _HEAD), ("priority", "f8", 6)])
 """The struct `sharing` of the C, which thrusters, tables and the matrix of commands follow."""
-STATE, SENSED = 12, 15
+STATE, SENSED = 13, 15
 """The numbers of doubles in `loop_state` and `sensor_values`."""
 SENSORS: tuple[str, ...] = (*"xyz", "phi", "theta", "psi", *"uvwpqr", "vg_N", "vg_E", "vg_D")
 """The variables of a vehicle that are the sensors. One that neither rolls nor pitches has psi alone."""

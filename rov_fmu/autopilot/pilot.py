@@ -31,6 +31,8 @@ class Pilot:
         """The mode of each of AXES."""
         self.aims = np.zeros(len(AXES))
         """What each of AXES aims at."""
+        self.held: dict[Axis, str] = {}
+        """The axes that `hold` was asked to hold, by the names of their aims."""
         self._states, self._numbers = np.zeros((len(AXES), STATE)), autopilot.sharing.numbers
         self._law = load_law()
 
@@ -56,7 +58,7 @@ class Pilot:
                 raise InputError(f"{name}: the thrusters of {vehicle} cannot hold {axis.name}, only {own}")
             if not (isinstance(value, (int, float, np.number)) and isfinite(value)):
                 raise InputError(f"{name} = {shown(value)}: must be a finite number")
-            n = AXES.index(axis)
+            n, self.held[axis] = AXES.index(axis), name
             self.modes[n], self.aims[n] = PLACE if name in PLACES else RATE, value
         return self
 

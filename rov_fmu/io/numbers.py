@@ -72,6 +72,9 @@ TIME_LIMITS = NumberRange("a number of seconds above 0, at most 1e6", ABOVE_0, 1
 """The time that the program of a stranger may take."""
 TOLERANCES = NumberRange("a number above 0", ABOVE_0)
 """A relative tolerance."""
+NUMBERS = NumberRange("a finite number")
+GAIN_VALUES = NumberRange("a number that is at least 0", 0.0)
+"""A gain, or the limit of one."""
 
 
 def significant(number: float, digits: int) -> str:

@@ -17,12 +17,15 @@ from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
 from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SENSORS, SHARING, STICK, THRUSTER
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, Axis
+from rov_fmu.autopilot.law import GAINS as NUMBERS
+from rov_fmu.autopilot.law import RATE as SPEED
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import THRUST_EFFECTS
 from verification.references.autopilot.ardusub import STICK as STICK_TIME
 from verification.references.autopilot.ardusub import VECTORED, VECTORED_6DOF, Hold, Motion
+from verification.references.autopilot.cascade import Cascade
 
 SIX, HEAVY = (load_vehicle(SHIPPED[name]) for name in ("bluerov2", "bluerov2_heavy"))
 
@@ -62,6 +65,35 @@ def test_the_law_in_c_is_ardusubs_hold(
         sinking = sinks
         assert outputs == pytest.approx(hold.outputs(motion, sticks[0], sticks[1], 1.0 / RATE), abs=1e-12)
     assert abs(flown.outputs).max() == 1.0
+
+
+@pytest.mark.parametrize("name", ["videoray", "bluerov2"])
+def test_the_law_in_c_is_the_cascade_from_the_stick_to_a_hold_and_to_another(name: str) -> None:
+    """What the law saw gives the same demands to the cascade, within rounding. No thruster reaches its limit."""
+    made = autopilot_of(load_vehicle(SHIPPED[name]))
+    axes = {SURGE: ("u", "x", False), HEAVE: ("vg_D", "z", False), YAW: ("r", "psi", True)}
+    share = {name: SENSORS.index(name) for names in axes.values() for name in names[:2]}
+    parts = [(STICK, 0.05, 0.1, 0.02), (PLACE, 0.1, 10.3, 0.1), (STICK, 0.0, 0.0, 0.0), (PLACE, 0.1, 10.4, -0.2)]
+    modes, aims = np.zeros((400, 6)), np.zeros((400, 6))
+    for n, (mode, ahead, depth, heading) in enumerate(parts):
+        rows, places = slice(100 * n, 100 * n + 100), [AXES.index(axis) for axis in axes]
+        modes[rows, places] = SPEED if mode == PLACE else STICK, mode, mode
+        aims[rows, places] = ahead, depth, heading
+    seen = Flights(made.vehicle, made.sharing, [{"z": 10.0}]).fly(made.loops, modes, aims, made.step)
+    assert np.abs(seen.outputs).max() < 1.0
+    for axis, (rate, place, turns) in axes.items():
+        a = AXES.index(axis)
+        loop = Cascade({key: made.gain(axis, key) for key in NUMBERS}, turns)
+        for now, mode, aim, demand in zip(seen.sensors[0], modes[:, a], aims[:, a], seen.demands[0, :, a], strict=True):
+            given = now[share[place]], now[share[rate]]
+            expected = (
+                loop.stick(aim)
+                if mode == STICK
+                else loop.place(aim, *given, made.step)
+                if mode == PLACE
+                else loop.rate(aim, given[1], made.step)
+            )
+            assert demand == pytest.approx(expected, abs=1e-9)
 
 
 # ---- The numbers -----------------------------------------------------------------------------------------------------
@@ -166,6 +198,27 @@ def test_a_hold_in_a_current_begins_with_its_velocity_over_ground() -> None:
     force = rov.hold(0.2, still, start={"z": 10.0}, north=0.0, east=0.0, depth=10.0, heading=0.0)["F_1"]
     assert np.ptp(force) > 6.0
     assert np.abs(np.diff(force)).max() < 3.0, "it was 7.3 N"
+
+
+@pytest.mark.parametrize("name", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_a_hold_that_begins_in_motion_does_not_overshoot_nor_does_a_speed_from_rest(name: str) -> None:
+    """After 3 s of a stick down and to starboard, the depth is held 2 m below and the heading 2 rad on."""
+    made = autopilot_of(load_vehicle(SHIPPED[name]))
+    flights = Flights(made.vehicle, made.sharing, [{"z": 10.0}])
+    level = [PLACE if axis in (ROLL, PITCH) and axis in made.axes else STICK for axis in AXES]
+    places = [AXES.index(axis) for axis in (HEAVE, YAW)]
+    modes, aims = np.tile(level, (150, 1)), np.zeros((150, 6))
+    aims[:, places] = 0.4, 0.3
+    before = flights.fly(made.loops, modes, aims, made.step).sensors[0, -1, [2, 5]]
+    modes, aims = np.tile(level, (750, 1)), np.zeros((750, 6))
+    modes[:, places], aims[:, places] = PLACE, before + 2.0
+    after = flights.fly(made.loops, modes, aims, made.step).sensors[0][:, [2, 5]] - before - 2.0
+    after[:, 1] = (after[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
+    assert (after.max(axis=0) < [0.01, radians(1.0)]).all()
+    assert np.abs(after[-1]).max() < 0.005
+    modes, aims = np.tile([SPEED, *level[1:]], (500, 1)), np.tile([0.3, *[0.0] * 5], (500, 1))
+    fast = Flights(made.vehicle, made.sharing, [{"z": 10.0}]).fly(made.loops, modes, aims, made.step).sensors[0, :, 6]
+    assert 0.297 < fast[-1] < fast.max() < 0.3 * 1.07
 
 
 @pytest.mark.parametrize("angle", [0.7, 2.5, -1.6])

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
-from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
+from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, OWN_GAINS, SENSORS, STATE, STEP_FILE, law_sources
 from rov_fmu.autopilot.pilot import PLACES
 from rov_fmu.build import model_fmu
 from rov_fmu.equation.attitude import QUATERNION
@@ -21,8 +21,6 @@ from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
 from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
 from rov_fmu.io.templates import render
 
-_SHOWN = tuple(GAINS)[: tuple(GAINS).index("k_a")]
-"""The gains that are parameters. The others are those of ArduSub's loops."""
 _PLUGS = ("pose", "body_velocity", "velocity")
 """The terminals of the vehicle that are the sensors."""
 _MODES = "0: stick, 1: rate, 2: place or angle"
@@ -93,7 +91,7 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         states[axis] = first
     gains = {axis: [-1] * len(GAINS) for axis in AXES}
     for axis in autopilot.axes:
-        for n, name in enumerate(_SHOWN):
+        for n, name in enumerate(OWN_GAINS):
             text = f"{axis.name.capitalize()}: {GAINS[name]}"
             own = Declaration(_unit(axis, name), text)
             start = autopilot.gain(axis, name)
