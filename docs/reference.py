@@ -8,6 +8,7 @@ import re
 from html import escape
 from importlib import import_module
 from inspect import getdoc, getsource, isfunction, signature
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,11 @@ from matplotlib.figure import Figure
 
 from docs import compared
 from rov_fmu import HOMES
+from rov_fmu.autopilot.figures import first_holds
+from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan
 from rov_fmu.cli import _commands
-from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
+from rov_fmu.equation.catalogue import AXIS, HEAVE, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.kinds import PRIORS
@@ -40,7 +43,7 @@ from verification.identification.strangers import gates
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "system.md", "cli.md", "api.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md"),
+    *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md", "autopilot.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
@@ -62,6 +65,7 @@ def tables() -> dict[str, Table]:
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
+    found["holds"] = _holds()
     kept = gates.stages()[-1:]
     by_group = gates.by_kind(kept)[: 1 + len(gates.GROUPS)]
     found |= {"gates": gates.gates(kept), "strangers": [(name, *cells) for name, _, *cells in by_group]}
@@ -96,6 +100,23 @@ def _frames() -> Table:
     for config, (frame, motors) in enumerate(FRAMES.items()):
         own = ", ".join(f"`{name}`" for name, frames in shipped.items() if frame in frames)
         rows.append((str(config), f"`{frame}`", str(len(motors)), own))
+    return rows
+
+
+def _holds() -> Table:
+    """Return the first holds of the vehicles that ship, for the steps of the autopilot that the page promises."""
+    steps = (0.01, 0.02, 0.05, 0.1)
+    rows: Table = [("vehicle", *(f"{1e3 * step:.0f} ms" for step in steps))]
+    for name, path in SHIPPED.items():
+        cells = []
+        for step in steps:
+            words = []
+            for axis, (figures, worst) in first_holds(autopilot_of(load_vehicle(path), step)).items():
+                factor, unit = (1e2, " cm") if axis is HEAVE else (degrees(1.0), "°")
+                over, most = factor * figures.overshoot[0], factor * worst
+                words.append(f"{figures.rise[0]:.1f} s, {over:.1f}{unit} ({most:.1f})")
+            cells.append("; ".join(words))
+        rows.append((f"`{name}`", *cells))
     return rows
 
 

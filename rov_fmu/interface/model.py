@@ -4,7 +4,7 @@ What needs NumPy is imported when it is called, so that `rov_fmu.load` is quick.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -234,11 +234,13 @@ class VehicleModel(Vehicle):
         begin |= held_inputs(self.layout, inputs)
         return VehicleStepper(self, begin, checked_record(record, self.layout, units_of(self.layout)))
 
-    def autopilot(self, step: float = 0.02, delay: float = 0.015) -> "Pilot":
+    def autopilot(self, step: float = 0.02, delay: float = 0.015, gains: Mapping[str, float] = _NONE) -> "Pilot":
         """Return an autopilot of the vehicle, with gains that are made for it, to be stepped in a loop.
 
         - `step`: the time between two calls, s.
         - `delay`: the time from the sensors to the thrust, s.
+        - `gains`: those that replace the ones that are made, by the names of the parameters of the autopilot's FMU:
+          `k_p_w` is `k_p` of the axis of the velocity w.
 
         It holds every axis along which the thrusters push:
 
@@ -246,12 +248,13 @@ class VehicleModel(Vehicle):
             for _ in range(500):
                 stepper.step(pilot.step(stepper.now, 0.02), 0.02)
 
-        Raises InputError if the thrusters cannot hold any axis, and BuildError where the law cannot be compiled.
+        Raises InputError about a gain, or if the thrusters cannot hold any axis, and BuildError where the law cannot be
+        compiled.
         """
         from rov_fmu.autopilot.gains import autopilot_of
         from rov_fmu.autopilot.pilot import Pilot
 
-        return Pilot(autopilot_of(self, LENGTHS.checked("step", step), delay))
+        return Pilot(autopilot_of(self, LENGTHS.checked("step", step), delay).with_gains(gains))
 
     def hold(
         self,
@@ -260,6 +263,7 @@ class VehicleModel(Vehicle):
         *,
         start: Mapping[str, Any] = _NONE,
         step: float = 0.02,
+        gains: Mapping[str, float] = _NONE,
         **aims: float,
     ) -> "Result":
         """Simulate the vehicle while its autopilot holds places, angles or velocities.
@@ -268,17 +272,23 @@ class VehicleModel(Vehicle):
         - `inputs`: inputs that are no commands, such as a load or a current.
         - `start`: that of `simulate`.
         - `step`: the time between two commands, s.
+        - `gains`: those of `autopilot`.
         - `aims`: `depth`, `heading`, `north` and `east`, `roll`, `pitch` (m, rad), or `surge`, `sway`, `heave`, `yaw`
           (m/s, rad/s).
 
-            rov.hold(20.0, {"V_N": 0.2}, depth=2.0, heading=0.5)["z"][-1]  # 2.0
+        The result has `aims` with the rise times and the overshoots, and its plot shows them.
+
+            run = rov.hold(20.0, {"V_N": 0.2}, depth=2.0, heading=0.5)
+            run["z"][-1], run.aims["depth"].overshoot  # 2.0 m, less than 0.01 m
 
         Raises InputError about an argument, also about an axis that the thrusters cannot hold.
         """
         import numpy as np
 
+        from rov_fmu.autopilot.figures import aims_of
+
         seconds, step = (MOTIONS.checked(key, x) for key, x in (("seconds", seconds), ("step", step)))
-        pilot = self.autopilot(step).hold(**aims)
+        pilot = self.autopilot(step, gains=gains).hold(**aims)
         if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
             raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")
         stepper = self.stepper(start=start, inputs=inputs)
@@ -289,7 +299,8 @@ class VehicleModel(Vehicle):
             if n + 1 < len(time):
                 stepper.step({**inputs, **commands[-1]}, float(time[n + 1] - time[n]))
         given = {name: np.array([one[name] for one in commands]) for name in self.layout.commands}
-        return self.simulate(time, {**inputs, **given}, start=start)
+        result = self.simulate(time, {**inputs, **given}, start=start)
+        return replace(result, aims=aims_of(pilot, result, step))
 
     def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
         """Return the time derivatives of the states by their names, in SI units.

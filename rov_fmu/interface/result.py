@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from rov_fmu.autopilot.figures import Aim
+
 Array = NDArray[np.float64]
 _SMALL = ("thrust", "command")
 """The quantities of all thrusters, which share a small panel."""
@@ -72,6 +74,8 @@ class Result(Mapping[str, Array]):
     """The commands of one vehicle at the times, as its inputs have them; empty for many vehicles."""
     command_unit: str = "1"
     """Their unit: 1 for fractions, us for pulse widths."""
+    aims: "Mapping[str, Aim]" = field(default_factory=dict)
+    """What an autopilot held, by name, with the rise time and the overshoot: that of `VehicleModel.hold`."""
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of a variable. Raises UnknownNameError, a KeyError, if it was not recorded."""
@@ -90,7 +94,8 @@ class Result(Mapping[str, Array]):
         vehicles = f"{len(first)} vehicles, " if first.ndim == 2 else ""
         failed = f", {len(self.failed)} failed" if len(self.failed) else ""
         span = f"{len(self.time)} times from {self.time[0]:g} to {self.time[-1]:g} s"
-        return f"<Result: {vehicles}{span}{failed}; {', '.join(self.arrays)}>"
+        aims = "".join(f"; {name}: {aim.told(1.0, self.units[aim.variable])}" for name, aim in self.aims.items())
+        return f"<Result: {vehicles}{span}{failed}; {', '.join(self.arrays)}{aims}>"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -166,6 +171,11 @@ class Result(Mapping[str, Array]):
                     alpha=faint,
                 )
                 lines[0].set_label(f"{_WORDS[name]} ({name})" if name in _WORDS else name)
+                for aim in (aim for aim in self.aims.values() if aim.variable == name):
+                    factor, _ = in_degrees(self.units[name])
+                    words = aim.told(factor, unit).replace(": ", ":\n").replace(", ", ",\n")
+                    color = lines[0].get_color()
+                    panel.axhline(factor * aim.value, color=color, linestyle=":", linewidth=1.0, label=words)
             low, high = panel.dataLim.intervaly
             if max(abs(low), abs(high)) > 0.0 and high - low < 1e-3 * max(abs(low), abs(high)):  # constant
                 panel.set_ylim(min(0.0, 1.1 * low), max(0.0, 1.1 * high))

@@ -1,25 +1,19 @@
 """The files of `export --to autopilot` and `--to gains`: the FMUs of the autopilot, and its gains as YAML."""
 
 from collections.abc import Iterator, Mapping
-from math import inf, pi, radians
+from dataclasses import astuple
+from math import inf
 
-import numpy as np
-
-from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.figures import STEPS, first_holds
 from rov_fmu.autopilot.gains import Autopilot, autopilot_of
-from rov_fmu.autopilot.law import AXES, PLACE, SENSORS, STICK
+from rov_fmu.autopilot.law import AXES
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
-from rov_fmu.bridges.sdf import Array
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, UPWARD, YAW, Axis
+from rov_fmu.equation.catalogue import UPWARD, Axis
 from rov_fmu.io.messages import one_line
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _UP = {axis for axis, sign in zip(AXES, UPWARD, strict=True) if sign > 0.0}
 """The axes whose sign is the same with y to port and z up."""
-_SECONDS = 15.0
-_STEPS = {HEAVE: (1.0, 0.02), YAW: (0.5 * pi, radians(2.0))}
-"""A step of the depth (m) and of the heading (rad), and the error within which the vehicle is settled."""
-_START = {"z": 10.0}
 _NONE = 1e-9
 """What rounding errors leave where a thruster has no part."""
 
@@ -29,21 +23,6 @@ def autopilot_files(vehicle: Vehicle) -> dict[str, bytes]:
     made = autopilot_of(vehicle)
     name = f"{vehicle.identifier}_autopilot"
     return {f"{name}{suffix}": autopilot_fmu(made, fmi=fmi) for fmi, suffix in ((2, ".fmu"), (3, ".fmi3.fmu"))}
-
-
-def flown(autopilot: Autopilot) -> Iterator[tuple[Axis, Array]]:
-    """Yield the axes of _STEPS that are held, with depths (m) or headings (rad) less the target after its step."""
-    vehicle, steps = autopilot.vehicle, round(_SECONDS / autopilot.step)
-    held = [axis for axis in autopilot.axes if axis in (*_STEPS, ROLL, PITCH)]
-    modes = np.tile([PLACE if axis in held else STICK for axis in AXES], (steps, 1))
-    for axis in (axis for axis in _STEPS if axis in held):
-        start = {name: value for name, value in _START.items() if name in vehicle.layout.state}
-        flights, aim = Flights(vehicle, autopilot.sharing, [start]), np.zeros(len(AXES))
-        aim[AXES.index(HEAVE)] = start.get("z", 0.0)
-        flights.fly(autopilot.loops, modes, np.tile(aim, (steps, 1)), autopilot.step)
-        aim[AXES.index(axis)] += _STEPS[axis][0]
-        seen = flights.fly(autopilot.loops, modes, np.tile(aim, (steps, 1)), autopilot.step).sensors[0]
-        yield axis, seen[:, SENSORS.index("z" if axis is HEAVE else "psi")] - aim[AXES.index(axis)]
 
 
 def gains_yaml(vehicle: Vehicle) -> Mapping[str, str]:
@@ -67,16 +46,16 @@ def gains_yaml(vehicle: Vehicle) -> Mapping[str, str]:
             f"     v_max: {gain['v_max']}, brake: {gain['brake']}, tau_max: {gain['most']},",
             f"     linear: {gain['d_1']}, quadratic: {gain['d_2']}, inertia: {gain['inertia']}}}",
         ]
-    lines.append("in_closed_loop:  # flown with the whole vehicle, from rest")
-    for axis, errors in flown(made):
-        size, within = _STEPS[axis]
-        late = np.flatnonzero(np.abs(errors) > within)
-        settled = (late[-1] + 1) * made.step if len(late) and late[-1] + 1 < len(errors) else inf if len(late) else 0.0
-        over, rest = max(0.0, float(errors.max())), abs(float(errors[-1]))
-        lines.append(
-            f"  {axis.name}: {{step: {size:.4g}, overshoot: {over:.3g}, within: {within:.3g}, settled: "
-            f"{settled if settled < inf else '.inf'}, error_at_the_end: {rest:.3g}}}"
-        )
+    lines.append(
+        "first_hold:  # of the whole vehicle from rest; others: 30 % more and less thrust and inertia, in a current"
+    )
+    for axis, (figures, worst) in first_holds(made).items():
+        size, within = STEPS[axis]
+        rise, over, settled, rest = ((f"{x[0]:.3g}" if x[0] < inf else ".inf") for x in astuple(figures))
+        lines += [
+            f"  {axis.name}: {{step: {size:.4g}, rise: {rise}, overshoot: {over}, overshoot_of_others: {worst:.3g},",
+            f"    within: {within:.3g}, settled: {settled}, error_at_rest: {rest}}}",
+        ]
     for frame, flipped in (("forward_starboard_down", set[Axis]()), ("forward_port_up", {*AXES} - _UP)):
         lines += [f"{frame}:", "  bias: {" + ", ".join(_signed(made, flipped)) + "}"]
         lines.append("  allocation:  # force of each thruster (N) per force or moment along the axes")
