@@ -477,7 +477,12 @@ def _fly(
     metavar="LOG.csv",
     help="Log to write, which identify reads. Each restart of the autopilot begins another log.",
 )
-@click.option("--force", is_flag=True, help="Replace logs that exist.")
+@_file_option(
+    "--parameters",
+    metavar="ROV.parm",
+    help="File of ArduSub's parameters for this vehicle to write, for sim_vehicle.py --add-param-file.",
+)
+@click.option("--force", is_flag=True, help="Replace logs and parameters that exist.")
 @click.option(
     "--log-rate",
     type=_number("a number from 1 to 100 (Hz)", 1.0, 100.0),
@@ -561,8 +566,9 @@ _option_of = partial(click.option, cls=_OptionOf)
     only="ardusub-gains",
     type=_FILE,
     metavar="FILE.param",
-    help="Fly the gains in this file of parameters in place of the vehicle's own",
+    help="The parameters that the vehicle has, whose gains are to be beaten. The default is those of the firmware",
 )
+@_set_option(help="Set a coefficient in SI units, such as the dead time T_d=0.02. It may be repeated.")
 @_option_of("--world", "in_world", only="sdf", is_flag=True, help="Add a world with water, which Gazebo can run")
 @_option_of(
     "--added-mass",

@@ -42,7 +42,7 @@ typedef struct {
 
 /* What the filters and integrators of an axis contain. */
 typedef struct {
-    double target, error, slope, integral, last, before, slow, rate, wanted, demand, carry, begun, mode;
+    double target, error, slope, integral, last, before, slow, rate, wanted, demand, carry, begun, aim, mode;
 } loop_state;
 
 /* What the sensors tell: the position and Euler angles; the velocity through the water and the turn rates along the body's axes; the
@@ -291,6 +291,8 @@ static void autopilot_step(const loop_gains gains[AXES], const sharing *share, l
             s->demand += (asked - s->demand) / (share->stick_time > 0.0 ? 1.0 + share->stick_time / h : 1.0);
         } else {
             double wanted = mode[a] == PLACE ? rate_for(off[a], k, a >= ROLL_AXIS) : aim[a];
+            wanted += mode[a] == PLACE && !begins ? k->k_aim * (aim[a] - s->aim) / h : 0.0;
+            s->aim = aim[a];
             s->begun = begins && k->handover > 0.0 ? 1.0 : s->begun / (1.0 + 2.0 * h / fmax(k->handover, h));
             wanted += s->begun * (rate[a] - wanted); /* the rate that there is fades away first, so that the integrator has nothing to do */
             double asked = loop_step(k, s, wanted, rate[a], h, begins);

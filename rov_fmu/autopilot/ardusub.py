@@ -6,7 +6,8 @@ outputs of the motors from them.
 
 The numbers are from ArduPilot's documentation and from what its sources do: `AC_PosControl`, `AC_AttitudeControl_Sub`,
 `AC_PID`, `AP_Motors6DOF`. The filters of the sensors are among them because loops that are too fast chatter by their
-delay. Left out are the estimator, sensor noise, the shaping of targets, and what stops an integrator at full thrust.
+delay. A new heading is a target that moves to it, as the real one's does. Left out are the estimator, sensor noise,
+the shaping of other targets, and what stops an integrator at full thrust.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -52,6 +53,9 @@ of the throttle. `AC_PosControl` lets the integrator reach the hover throttle, w
 full demand, whatever PSC_ACCZ_IMAX is."""
 _SENSORS = 20.0
 """The filters of gyroscope and accelerometer (INS_GYRO_FILTER, INS_ACCEL_FILTER), Hz."""
+_SLEW, _INPUT_TIME, _TURN_UP = radians(60.0), 0.15, radians(1100.0)
+"""How a target of the heading moves: its largest rate (ATC_SLEW_YAW), the time constant with which it arrives
+(ATC_INPUT_TC), and its largest acceleration (ATC_ACCEL_Y_MAX)."""
 STICK_TIME = 0.8
 """The time constant with which a stick moves, s."""
 TURNING = 3.375 * pi / 4.0
@@ -82,9 +86,9 @@ class FlownLeg:
     fractions: Array
     """The commands from -1 to 1 (times x commands x vehicles)."""
 
-    def of_first(self, count: int) -> "FlownLeg":
-        """Return the leg of the first vehicles alone."""
-        return FlownLeg(self.leg, *(part[..., :count].copy() for part in (self.errors, self.demands, self.fractions)))
+    def of(self, *vehicles: int) -> "FlownLeg":
+        """Return the leg of some vehicles by their numbers."""
+        return FlownLeg(self.leg, *(part[..., [*vehicles]] for part in (self.errors, self.demands, self.fractions)))
 
 
 class Mixer:
@@ -153,6 +157,17 @@ def loops_of(gains: Mapping[str, Any], count: int) -> NDArray[np.void]:
     return loops
 
 
+def _moving(begin: float, end: float, steps: int) -> Array:
+    """Return the target of the heading in each step on its way to a new one."""
+    targets, at, rate = np.empty(steps), begin, 0.0
+    for n in range(steps):
+        wanted = min(max((end - at) / _INPUT_TIME, -_SLEW), _SLEW)
+        rate += min(max(wanted - rate, -_TURN_UP / RATE), _TURN_UP / RATE)
+        at += rate / RATE
+        targets[n] = at
+    return targets
+
+
 def fly(
     vehicle: Vehicle,
     gains: Mapping[str, Any],
@@ -179,6 +194,7 @@ def fly(
         [round(RATE * delay) for delay in delays or [0.0] * count],
     )
     loops, held = loops_of(gains, count), [AXES.index(axis) for axis in ROWS]
+    loops["k_aim"][:, AXES.index(YAW)] = 1.0
     aim = np.array([start.get("z", 0.0) if axis is HEAVE else 0.0 for axis in AXES])
     mode = np.array([PLACE if axis in ROWS else STICK for axis in AXES])
     signs = np.array([-1.0 if axis is HEAVE else 1.0 for axis in DEMANDS])
@@ -188,7 +204,10 @@ def fly(
         aim[AXES.index(SURGE)] *= leg.axis is SURGE
         steps, ahead = round(leg.seconds * RATE), leg.axis is SURGE and leg.size > 0.0
         inputs = {HEAVE.external: np.reshape(loads, (-1, 1)) * ahead} if layout.has(HEAVE) else {}
-        flown = flights.fly(loops, np.tile(mode, (steps, 1)), np.tile(aim, (steps, 1)), 1.0 / RATE, inputs)
+        aims = np.tile(aim, (steps, 1))
+        if leg.axis is YAW:
+            aims[:, n] = _moving(aim[n] - leg.size, aim[n], steps)
+        flown = flights.fly(loops, np.tile(mode, (steps, 1)), aims, 1.0 / RATE, inputs)
         errors = flown.sensors[..., [SENSORS.index(name) for name in ("phi", "theta", "psi", "z")]] - aim[held]
         errors[..., 2] -= 2.0 * pi * np.floor(errors[..., 2] / (2.0 * pi) + 0.5)
         errors[flights.failed] = nan

@@ -89,11 +89,10 @@ def aims_of(pilot: Pilot, seen: Mapping[str, Array], h: float) -> dict[str, Aim]
     return aims
 
 
-def corner(vehicle: Vehicle, thrust: float, inertia: float) -> dict[str, float]:
-    """Return the coefficients of a vehicle whose thrust and inertia are multiplied by factors."""
+def scaled(vehicle: Vehicle, axis: Axis, thrust: float, inertia: float) -> dict[str, float]:
+    """Return the coefficients of a vehicle whose thrust and inertia along an axis are multiplied by factors."""
     by = (("alpha", thrust), ("beta", 1.0 / inertia))
-    names = [(axis.coefficient(key), factor) for axis in vehicle.layout.bare_axes for key, factor in by]
-    return {name: factor * vehicle[name] for name, factor in names}
+    return {name: factor * vehicle[name] for key, factor in by for name in [axis.coefficient(key)]}
 
 
 def first_holds(autopilot: Autopilot) -> dict[Axis, tuple[StepFigures, float]]:
@@ -111,8 +110,11 @@ def first_holds(autopilot: Autopilot) -> dict[Axis, tuple[StepFigures, float]]:
     own = {*vehicle.layout.state, *vehicle.layout.inputs}
     start, current = ({k: x for k, x in some.items() if k in own} for some in ({"z": 10.0}, _CURRENT))
     parts = (1.0 + _PART, 1.0 - _PART)
-    corners = [corner(vehicle, thrust, inertia) for thrust in parts for inertia in parts]
-    others = [start, start | current, start, *(start | one for one in corners)]
+    others = [start, start | current, start]
+    for by in ((thrust, inertia) for thrust in parts for inertia in parts):
+        others.append(
+            start | {k: x for axis in vehicle.layout.bare_axes for k, x in scaled(vehicle, axis, *by).items()}
+        )
     held = [axis for axis in autopilot.axes if axis in (*STEPS, ROLL, PITCH)]
     aims = {axis: size for axis, (size, _) in STEPS.items() if axis in held}
     mode = [PLACE if axis in held else STICK for axis in AXES]

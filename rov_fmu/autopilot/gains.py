@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from rov_fmu.autopilot.allocation import allocation_matrix, thrust_rows
 from rov_fmu.autopilot.law import AXES, LOOP, OWN_GAINS, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError, listed, only
 from rov_fmu.io.numbers import GAIN_VALUES, NUMBERS
 from rov_fmu.tank.arrays import Array
@@ -107,17 +108,25 @@ def autopilot_of(vehicle: Vehicle, step: float = STEP, delay: float = DELAY) -> 
             chosen.append(axis)
     axes = tuple(axis for axis in AXES if axis in chosen)
     loops = np.zeros(len(AXES), LOOP)
-    lags = {axis.name: _lag(vehicle, axis) for axis in axes}
+    lags = {axis.name: lag_along(vehicle, axis) + vehicle.coefficients.get("T_d", 0.0) for axis in axes}
     sharing = _sharing(vehicle, axes, np.array([rows[axis] for axis in axes]))
     for axis in axes:
         loops[AXES.index(axis)] = _loop(vehicle, axis, sharing, lags[axis.name], step, delay)
     return Autopilot(vehicle, step, delay, axes, loops, sharing, lags)
 
 
-def _lag(vehicle: Vehicle, axis: Axis) -> float:
-    curves = [vehicle.layout.curve_of[one.name] for one in vehicle.layout.thrusters_along(axis)]
-    dead = vehicle.coefficients.get("T_d", 0.0)
-    return dead + max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=0.0)
+def lag_along(vehicle: Vehicle, axis: Axis) -> float:
+    """Return the largest lag T of the thrusters along an axis that gains are made for, s; 0 without any.
+
+    Of one that is not known, it is the mean of the ends of its 95 % interval: its estimate is next to the lower end.
+    """
+    curves = (vehicle.layout.curve_of[one.name] for one in vehicle.layout.thrusters_along(axis))
+    return max((_lag(vehicle, curve) for curve in curves if curve.has_lag), default=0.0)
+
+
+def _lag(vehicle: Vehicle, curve: Curve) -> float:
+    lag, interval = vehicle[curve.coefficient("T")], vehicle.basis[curve.coefficient("T")].interval
+    return 0.5 * sum(interval) if interval and interval[1] > 2.0 * lag else lag
 
 
 def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing:

@@ -37,6 +37,7 @@ GAINS: Mapping[str, str] = {
     "handover": "time in which the demand before a hold fades away",
     "k_a": "from the error of the rate to the acceleration, 1/s: the controller is then one of acceleration",
     "k_ff": "from the target to the demand",
+    "k_aim": "from the rate of a moving aim to the rate",
     **dict.fromkeys(("f_a", "f_target", "f_error", "f_sensor", "f_demand"), "frequency of a filter, Hz"),
 }
 """The numbers of an axis, `loop_gains` of the C, with their meaning. 0 is none."""
@@ -47,7 +48,7 @@ THRUSTER = np.dtype([("of_axis", "f8", 6), ("to_axis", "f8", 6), ("row", "f8"), 
 _HEAD = ("thrusters", "rows", "commands", "scales", "steps", "attitude", "stick_time", "neutral", "ahead", "astern")
 SHARING = np.dtype([*((name, "f8") for name in _HEAD), ("priority", "f8", 6)])
 """The struct `sharing` of the C, which thrusters, tables and the matrix of commands follow."""
-STATE, SENSED = 13, 15
+STATE, SENSED = 14, 15
 """The numbers of doubles in `loop_state` and `sensor_values`."""
 SENSORS: tuple[str, ...] = (*"xyz", "phi", "theta", "psi", *"uvwpqr", "vg_N", "vg_E", "vg_D")
 """The variables of a vehicle that are the sensors. One that neither rolls nor pitches has psi alone."""

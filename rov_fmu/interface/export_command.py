@@ -40,7 +40,7 @@ class Job:
     seed: int | None = None
     """That of the draws."""
     gains: Path | None = None
-    """A file with parameters of ArduSub, whose gains are flown in place of the vehicle's own."""
+    """A file with the parameters that ArduSub has, whose gains are to be beaten."""
     force: bool = False
     """True to replace files of others, and to draw also where an axis is not fit for use."""
 
@@ -79,15 +79,23 @@ class Export:
     """The kind of its file (`file_kinds`); a format without one is a folder of files."""
 
 
-def export(vehicle: Path, to: str, output: Path | None, **options: Any) -> tuple[Exported, dict[Path, str]]:
+def export(
+    vehicle: Path, to: str, output: Path | None, *, settings: Sequence[str] = (), **options: Any
+) -> tuple[Exported, dict[Path, str]]:
     """Write a vehicle in a format of EXPORTS, with the options of a Job.
+
+    `settings` are coefficients as `NAME=VALUE`, such as `T_d=0.02`, in place of those of the file.
 
     Return what was made, and the file or the folder that was written, with what it replaced. Raises FileError,
     InputError about an option or a vehicle that the format cannot have, and WriteError.
     """
+    from rov_fmu.interface.simulate_command import with_settings
     from rov_fmu.vehicle.vehicle import load_vehicle
 
-    chosen, loaded = EXPORTS[to], load_vehicle(vehicle)
+    chosen = EXPORTS[to]
+    loaded, given = with_settings(load_vehicle(vehicle), settings)
+    if others := [*given.inputs, *given.start]:
+        raise InputError(f"--set {others[0]}: an export has coefficients alone, such as T_d=0.02")
     path = output or Path(f"{loaded.identifier}{chosen.end}")
     job = Job(loaded, path, **options)
     if not chosen.kind and path.is_file():

@@ -1,12 +1,12 @@
 """The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any
+from typing import Any, TypeVar
 
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.words import AFLOAT, LEFT_WATER
@@ -19,6 +19,9 @@ from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 from rov_fmu.vehicle.shipped import shipped_name
 from rov_fmu.vehicle.steady import Steady
+from rov_fmu.vehicle.vehicle import Vehicle
+
+AnyVehicle = TypeVar("AnyVehicle", bound=Vehicle)
 
 _STOP = 10.0
 """The default end of a simulation, s, as in the FMU's default experiment."""
@@ -75,12 +78,10 @@ def find_speeds(path: Path, wanted: Sequence[str], settings: Sequence[str]) -> N
 
     `settings` may have coefficients, loads and the voltage. Raises FileError, InputError.
     """
-    vehicle = load(path)
-    given = read_settings(settings, vehicle.layout)
+    vehicle, given = with_settings(load(path), settings)
     chosen = vehicle.layout.commands.keys() | vehicle.layout.by_name.keys() | given.start.keys()
     for name in (name for name in (*given.inputs, *given.start) if name in chosen):
         raise InputError(f"--set {name}: --find chooses commands and states itself")
-    vehicle = vehicle.with_(**given.coefficients)
     rows = [_found(vehicle, text, given.inputs) for text in wanted]
     power = [] if rows[0].power is None else ["power"]
     found = table("", "axis", ["speed", "command", "thrust", *power])
@@ -149,7 +150,7 @@ def simulation_of(
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
             )
-    given = read_settings(settings, vehicle.layout)
+    changed, given = with_settings(vehicle, settings)
     for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
@@ -159,7 +160,6 @@ def simulation_of(
     stop, step = _STOP if stop is None else stop, STEP if step is None else step
     if stop / step > _MOST_RESULTS:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
-    changed = vehicle.with_(**given.coefficients)
     return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start)
 
 
@@ -179,6 +179,17 @@ class Settings:
     """The inputs; the name of an axis stands for the commands that drive it."""
     start: dict[str, float]
     coefficients: dict[str, float]
+
+
+def with_settings(vehicle: AnyVehicle, settings: Sequence[str]) -> tuple[AnyVehicle, Settings]:
+    """Return a vehicle with the coefficients of the options --set, and what else they set. Raises InputError.
+
+    A dead time T_d may be set where the file has none.
+    """
+    if any(text.partition("=")[0].strip() == "T_d" for text in settings):
+        vehicle = vehicle.with_(replace(vehicle.layout, has_dead_time=True))
+    given = read_settings(settings, vehicle.layout)
+    return vehicle.with_(**given.coefficients), given
 
 
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:

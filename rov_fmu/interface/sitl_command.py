@@ -16,10 +16,10 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import FAINT
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
-from rov_fmu.interface.simulate_command import read_settings
+from rov_fmu.interface.simulate_command import with_settings
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
-from rov_fmu.io.output import check_targets
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, chosen_frame, config_of, servos_of
 from rov_fmu.vehicle.steady import beyond_stated
@@ -32,13 +32,17 @@ _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
 
 
-def serve(path: Path, *, host: str, port: int, duration: float | None, **flight: Any) -> None:
+def serve(path: Path, *, host: str, port: int, duration: float | None, parameters: Path | None, **flight: Any) -> None:
     """Answer an autopilot until the duration (s) is over or the command is interrupted, and then write the log.
 
-    `flight` has the other options, which `_setup` describes. Raises FileError, InputError about an option, WriteError
-    about the log, and BuildError.
+    `parameters` is a file of parameters to write for ArduSub. `flight` has the other options, which `_setup` describes.
+    Raises FileError, InputError about an option, WriteError about a file, and BuildError.
     """
     setup, frame = _setup(path, **flight)
+    if parameters:
+        needed = _parameters(frame, rolls_alone=_rolls_alone(setup))
+        _check_free("--parameters", parameters, [path, *setup.vehicle.files], force=setup.force)
+        write_whole(Output(parameters, needed.encode()), force=True)
     with socket(AF_INET, SOCK_DGRAM) as server:
         try:
             server.bind((host, port))
@@ -95,15 +99,11 @@ def _setup(
     if frame is not None and frame not in FRAMES:
         hint = did_you_mean(frame, FRAMES)
         raise InputError(f"--frame {shown(frame)}: must be one of {', '.join(FRAMES)}{hint}")
-    vehicle = load(path)
+    vehicle, given = with_settings(load(path), settings)
     if not vehicle.layout.commands:
         raise InputError(f"{path}: this vehicle has no thrusters, so there is nothing that ArduSub could drive")
     if log:
-        check_targets([(log, "")], [path, *vehicle.files], force=True)
-        if os.path.lexists(log) and not force:
-            raise InputError(f"--log {log}: the file exists; choose another name, or replace it with --force")
-    given = read_settings(settings, vehicle.layout)
-    vehicle = vehicle.with_(**given.coefficients)
+        _check_free("--log", log, [path, *vehicle.files], force=force)
     inputs = with_axes(vehicle.layout, {name: np.array(value) for name, value in given.inputs.items()})
     checked_values("inputs", inputs, vehicle.layout.inputs, many=False)
     checked_start(given.start, vehicle.layout, many=False)
@@ -116,6 +116,13 @@ def _setup(
     fitting = chosen_frame(*chosen)
     own = "" if servos else fitting
     return Setup(vehicle, driven, start, bottom, log, 1.0 / log_rate, force, own), fitting
+
+
+def _check_free(option: str, path: Path, inputs: Sequence[Path], *, force: bool) -> None:
+    """Raise InputError if a file that an option names exists, unless it is to be replaced, or is one of the inputs."""
+    check_targets([(path, "")], inputs, force=True)
+    if os.path.lexists(path) and not force:
+        raise InputError(f"{option} {path}: the file exists; choose another name, or replace it with --force")
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
@@ -144,6 +151,13 @@ def _rolls_alone(setup: Setup) -> bool:
     layout = setup.vehicle.layout
     driven = [t for t in layout.thrusters if f"u_{t.name}" in setup.servos]
     return not layout.has(ROLL) and any(abs(t.effect(ROLL)) > FAINT and t.effect(HEAVE) for t in driven)
+
+
+def _parameters(frame: str, *, rolls_alone: bool) -> str:
+    """Return the parameters with which ArduSub flies the vehicle, for `sim_vehicle.py --add-param-file`."""
+    own = " ".join(config_of(frame).split()[:2]) if frame else ""
+    lines = (own, "BARO_SPEC_GRAV 1.0264", "SIM_RATE_HZ 400", "ATC_RAT_RLL_I 0" if rolls_alone else "")
+    return "".join(f"{line}\n" for line in lines if line)
 
 
 _NO_ROLL = (

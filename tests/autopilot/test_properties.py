@@ -47,18 +47,23 @@ def test_the_law_in_c_is_ardusubs_hold(
 ) -> None:
     """What the law saw in a flight of 4 s gives the same outputs to the hold of ArduSub, within rounding.
 
-    The hold does not limit the acceleration of roll and pitch.
+    The hold does not limit the acceleration of roll and pitch. The target of the heading moves by the hold.
     """
+    shaping = Hold.by(gains, heading=0.0)
+    shaping._heading(1.0 / RATE)
+    shaping.heading = radians(90.0)
     share = replace(Mixer(vehicle).sharing, steps=0.0, scales=True)
     modes = np.tile([STICK, STICK, PLACE, PLACE, PLACE, PLACE], (1600, 1))
     both = [[0.0, 0.0, 10.0, 0.0, 0.0, 0.0], [0.5, -0.5, 10.5, 0.0, 0.0, radians(90.0)]]
     aims = np.repeat(both, [100, 1500], axis=0)
+    aims[100:, 5] = [shaping._heading(1.0 / RATE)[0] for _ in range(1500)]
     loops = loops_of(gains, 1)
+    loops["k_aim"][:, AXES.index(YAW)] = 1.0
     loops["brake"][:, [AXES.index(ROLL), AXES.index(PITCH)]] = 0.0
     flown = Flights(vehicle, share, [{"z": 10.0}]).fly(loops, modes, aims, 1.0 / RATE)
     hold, sticks, sinking = Hold.by(gains, frame=frame), np.zeros(2), 0.0
     for seen, aim, outputs in zip(flown.sensors[0], aims, flown.outputs[0], strict=True):
-        hold.depth, hold.heading = aim[2], aim[5]
+        hold.depth, hold.heading = aim[2], radians(90.0) * (aim[0] != 0.0)
         sticks += (aim[:2] - sticks) / (1.0 + RATE * STICK_TIME)
         attitude, rates, sinks = (*seen[3:6],), (*seen[9:12],), seen[14]
         motion = Motion(attitude, rates, seen[2], sinks, RATE * (sinks - sinking))

@@ -24,8 +24,10 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.bridges.sitl import MOST_LOGS, Outputs, Setup, SitlConnection
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
+from rov_fmu.c.stepper import Stepper
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
+from rov_fmu.interface.sitl_command import _setup
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -557,3 +559,34 @@ def test_another_frame_with_as_many_motors_is_noticed_and_the_own_one_is_not(nam
         told.append([words for words, *_ in outputs.doubts()])
     assert told[-1] == ([] if name == own else ["no demands give these pulses together"])
     assert not any(told[: 3 * FAST - 1])
+
+
+def test_the_parameters_of_ardusub_are_written_as_the_simulator_loads_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+) -> None:
+    """ArduPilot's simulator reads a name and a value from each line of a file of --add-param-file."""
+    monkeypatch.chdir(tmp_path)
+    expected = {"bluerov2": (1, 0.0), "bluerov2_heavy": (2, None)}
+    for name, (config, integral) in expected.items():
+        options = [name, "--port", "0", "--duration", "0.01", "--parameters", "rov.parm", "--force"]
+        assert main(["sitl", *options]) == 0
+        values = {n: float(x) for n, x in (line.split() for line in Path("rov.parm").read_text("utf-8").splitlines())}
+        assert values.pop("ATC_RAT_RLL_I", None) == integral
+        assert values == {"FRAME_CONFIG": config, "BARO_SPEC_GRAV": 1.0264, "SIM_RATE_HZ": 400.0}
+    capsys.readouterr()
+    assert main(["sitl", *options[:-1]]) == 2
+    assert capsys.readouterr().err == (
+        "rov-fmu: --parameters rov.parm: the file exists; choose another name, or replace it with --force\n"
+    )
+
+
+def test_a_dead_time_may_be_set_where_the_file_has_none() -> None:
+    setup, _ = _setup(
+        SHIPPED["bluerov2"],
+        **{"frame": None, "servos": (), "settings": ["T_d=0.02", "z=2"], "bottom": 20.0},
+        **{"log": None, "log_rate": 10.0, "force": False},
+    )
+    assert (setup.vehicle["T_d"], setup.start) == (0.02, {"z": 2.0})
+    late, now = (Stepper(rov, {}, ["F_1"]) for rov in (setup.vehicle, load_vehicle(SHIPPED["bluerov2"])))
+    commands = [0.5] * 6
+    assert late.step(commands, 0.019)[-1] == 0.0 < abs(now.step(commands, 0.019)[-1])

@@ -7,8 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from rov_fmu.autopilot.ardusub import FIRMWARE, RATE
+from rov_fmu.autopilot.ardusub import RATE, ROWS
 from rov_fmu.bridges.ardusub.gains import FIGURES, HEAD, NEW_NAMES, RANGES, SHOWN, Tuned, figures
+from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.io.messages import one_line
 from rov_fmu.report.console import table, text
 from rov_fmu.report.plots.png import png_file
@@ -32,10 +33,10 @@ _THINNED = 8
 
 def gains_files(tuned: Tuned) -> dict[str, str | bytes]:
     """Return the files of the folder by name."""
-    lines = [",".join(["leg", "unit", *(f"{column} ({of})" for column in FIGURES for of in ("firmware", "these"))])]
+    lines = [",".join(["leg", "unit", *(f"{column} ({of})" for column in FIGURES for of in (tuned.whose, "these"))])]
     lines += [
         ",".join([leg, unit, *(f"{x:.4g}" for x in cells[:, ::-1].flat)])
-        for leg, unit, cells in figures(tuned.vehicle, tuned.legs)
+        for _, leg, unit, cells in figures(tuned.vehicle, tuned.legs)
     ]
     return {
         **{
@@ -60,25 +61,32 @@ def _parameters(tuned: Tuned, version: str, suffix: str) -> str:
         new = [(name.replace(o, n), f) for o, (n, f) in _GENERATIONS[version].items() if name.startswith(o)]
         own, factor = new[0] if new else (name, 1.0)
         low, high = (factor * end for end in RANGES[name])
-        usual = f"the firmware's is {factor * FIRMWARE[name]:g}, documented are {low:g} to {high:g}"
+        usual = f"{tuned.whose} is {factor * tuned.usual[name]:g}, documented are {low:g} to {high:g}"
         lines += ["", f"# {own}: {one_line(reason)} ({usual})", form.format(own, factor * value)]
         lines[-1:-1] = [f"# {own}: {_UNSCALED}"] if own == "PSC_D_ACC_FF" else []
     return "\n".join([*lines, ""])
 
 
 def flight_table(tuned: Tuned) -> Table:
-    """Return the table of the flight for people: with the firmware's gains, and after the arrow with these."""
-    shown = table("A flight with the firmware's gains → with these", "leg", FIGURES)
-    for leg, unit, cells in figures(tuned.vehicle, tuned.legs):
+    """Return the table of the flight for people: with the usual gains, and after the arrow with these.
+
+    Below are the figures by which the gains of an axis are written or left out.
+    """
+    shown = table(f"A flight with {tuned.whose} gains → with these", "leg", FIGURES)
+    for _, leg, unit, cells in figures(tuned.vehicle, tuned.legs):
         pairs = [["never" if x == inf else text(x, ".2f") for x in pair[::-1]] for pair in cells]
         units = (f" {unit}", "", f" {unit}", "")
         shown.add_row(leg, *(f"{old} → {new}{of}" for (old, new), of in zip(pairs, units, strict=True)))
+    for axis, ratios in tuned.compared.items():
+        is_written = any(ROWS[axis] in name for name in tuned.gains)
+        words = "written" if is_written else "left out"
+        shown.add_row(f"{axis.name}, also 20 ms later: of {tuned.whose}", *(f"{ratio:.0%}" for ratio in ratios), words)
     return shown
 
 
 def _draw(figure: Figure, tuned: Tuned) -> None:
     """Draw depth and heading with their targets, and the demands, with these gains and with the firmware's."""
-    axes = [axis for axis in SHOWN if tuned.vehicle.layout.has(axis)]
+    axes = [axis for axis in (HEAVE, YAW) if tuned.vehicle.layout.has(axis)]
     panels = figure.subplots(2 * len(axes), sharex=True, squeeze=False, height_ratios=[1.0, 0.6] * len(axes))[:, 0]
     for n, axis in enumerate(axes):
         words, row, scale, unit, _ = SHOWN[axis]
@@ -91,7 +99,7 @@ def _draw(figure: Figure, tuned: Tuned) -> None:
         time = np.arange(len(targets)) * _THINNED / RATE
         panels[2 * n].plot(time, scale * targets, color=LIGHT["muted"], linewidth=0.8, label="target")
         for panel, lines in ((panels[2 * n], scale * (targets + errors)), (panels[2 * n + 1], 100.0 * demands)):
-            for line, color, label in zip(lines.T, ("orange", "blue"), ("firmware's", "these gains"), strict=True):
+            for line, color, label in zip(lines.T, ("orange", "blue"), (tuned.whose, "these gains"), strict=True):
                 panel.plot(time, line, color=LIGHT[color], linewidth=1.2, label=label)
         name_axes(panels[2 * n], f"{words} from the start", unit)
         name_axes(panels[2 * n + 1], f"demand of {axis.name}", "%")

@@ -1,4 +1,4 @@
-"""The gains of ArduSub for a vehicle: a rule in closed form, and a check in flight before they are written.
+"""The gains of ArduSub for a vehicle: a rule in closed form, and flights that decide which of them are written.
 
 What the loops do depends on the acceleration per demand, k/M or k/J, on the lag T of the thrust, and on the time from
 the sensors to the thrust, which is the dead time T_d and DELAY. M and J are the mass and the inertia with added mass, k
@@ -6,38 +6,47 @@ is the force or moment along the axis per demand, at 30 %. So the scale of an as
 
 - depth: the acceleration loop has the gain 0.8, so PSC_ACCZ_P = 0.8 M/(0.2 k), and the speed loop the bandwidth
   min(8/s, 0.88/(T + T_d)), which is PSC_VELZ_P;
-- turns: the rate loop has the bandwidth k_v = min(2.8/T, 0.315/(T_d + 35 ms)), so ATC_RAT_*_P = k_v J/k, and
-  ATC_ANG_*_P = k_v/2.5. Of the 35 ms, ArduSub's filters take 20.
+- turns: the rate loop has the bandwidth k_v = min(2.8/T, 0.585/(margin (T_d + 35 ms))), so ATC_RAT_*_P = k_v J/k, and
+  ATC_ANG_*_P = k_v/ratio. Of the 35 ms, ArduSub's filters take 20.
 
-The real ArduSub flew such gains of depth. Its gains of yaw were up to three times as large, which is calm there, and
-chatters with 15 ms more delay, or with 30 % more thrust and less inertia: off the dead band, the slope of the thrust is
-2 to 4 times the k of the rule. `tuned` flies such vehicles with thrusters biased to 50 %, and lowers the gains until
-nothing chatters.
+Stiffness and chatter are the same product P k/J: a larger P turns a heading out of the dead band of its thrusters, and
+chatters where k/J or the delay is larger than in the file. So the margin decides how good a heading can be. It is that
+of the file's intervals if the vehicle was identified. The ratio, and the integrator of the heading, are chosen by
+flights. In 48 flights of the real ArduSub with six vehicles, k_v of 11 to 13/s with 0.3/s of P as the integrator
+overshot less and settled earlier than the firmware's gains. With less than 0.3/s its first turn overshoots by 8 deg.
+
+`tuned` then flies vehicles that differ from the file, with thrusters biased to 50 %, and lowers the gains until nothing
+chatters. What does not beat the gains that the vehicle has is left out.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import takewhile
-from math import degrees, inf, nan, radians
+from math import degrees, inf, nan, radians, sqrt
 from pathlib import Path
 
 import numpy as np
 
 from rov_fmu.autopilot.ardusub import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.autopilot.figures import scaled, step_figures
+from rov_fmu.autopilot.gains import lag_along
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
 from rov_fmu.io.reading import read_text
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
+BEFORE = Leg(YAW, radians(4.0))
+"""A small turn, after which the integrator is as in a dive. It is not shown."""
 LEGS = (
     Leg(SURGE, 0.0, 3.0),
     *(Leg(HEAVE, size) for size in (0.5, -0.5, 1.5, -1.5)),
+    *(Leg(axis, radians(size)) for axis in (ROLL, PITCH) for size in (15.0, -15.0)),
+    BEFORE,
     *(Leg(YAW, radians(size)) for size in (30.0, -30.0, 90.0, -90.0)),
     Leg(SURGE, 0.5, 6.0),
 )
-"""The flight: a start, steps of depth and of heading, and six seconds ahead."""
+"""The flight: a start, steps of depth, of roll and pitch, and of heading, and six seconds ahead."""
 NEW_NAMES = {"PSC_POSZ_": ("PSC_D_POS_", 1.0), "PSC_VELZ_": ("PSC_D_VEL_", 1.0), "PSC_ACCZ_": ("PSC_D_ACC_", 0.1)}
 """How names begin before ArduSub 4.7, and from 4.7 on, with the factor of the values: `AC_PosControl` in SI units."""
 HEAD = "# The gains of ArduSub for "
@@ -51,7 +60,20 @@ _SWING = (radians(10.0), radians(10.0), radians(10.0), 0.25)
 _CHATTER = 1.0
 """A demand that changes by more than this in a second at rest chatters. The gains that were flown have at most 0.1, and
 those of another vehicle 8, as in the flight of the real ArduSub."""
-_LOWER, _LEAST = 0.8, 0.25
+_CORNER, _LEAST_CORNER = 1.3 / 0.7, 1.2
+"""The acceleration per demand that is borne, relative to that of the file: of a vehicle of which nothing is known, and
+the least."""
+_CHOICES = tuple((ratio, integral) for ratio in (1.5, 2.0, 2.5) for integral in (0.3, 0.5))
+"""What k_v/ATC_ANG_YAW_P and ATC_RAT_YAW_I/ATC_RAT_YAW_P (1/s) are chosen from."""
+_OF_TILT = (2.5, 0.5)
+"""The same of roll and pitch."""
+_WORST = 1.1
+"""Gains lose where a figure is worse than this, relative to the usual ones, or where they are no better on average."""
+_LOST = (
+    "with them it would have {:.0%} of the overshoot, {:.0%} of the settling time and {:.0%} of the error at rest that "
+    "it has with {} gains"
+)
+_LOWER, _LEAST = 0.9, 0.25
 """By what gains are lowered at a time, and the least share of the rule's."""
 _DRAWS = 8
 _FAR = 1.96
@@ -74,7 +96,12 @@ _LARGEST = 1e6
 
 
 FIGURES = ("overshoot", "settled in s", "error at rest", "changes of commands per s")
-SHOWN = {HEAVE: ("depth", 3, 100.0, "cm", 0.05), YAW: ("heading", 2, degrees(1.0), "deg", radians(2.0))}
+SHOWN = {
+    HEAVE: ("depth", 3, 100.0, "cm", 0.05),
+    ROLL: ("roll", 0, degrees(1.0), "deg", radians(2.0)),
+    PITCH: ("pitch", 1, degrees(1.0), "deg", radians(2.0)),
+    YAW: ("heading", 2, degrees(1.0), "deg", radians(2.0)),
+}
 """The words, the row of the errors and demands, the factor and the unit that people read, and what counts as settled
 (m, rad), by axis."""
 
@@ -88,81 +115,125 @@ class Tuned:
     gains: Mapping[str, tuple[float, str]]
     """The values and their reasons, by the names before ArduSub 4.7. An axis without gains of its own is left out."""
     notes: Sequence[str]
-    """What the reader should know: an axis that has not the gains of the rule, or gains of another vehicle."""
+    """What the reader should know: an axis that has not the gains of the rule, or the delay that they bear."""
     legs: Sequence[FlownLeg]
-    """The first vehicle has these gains, and the second one the firmware's."""
+    """The first vehicle has these gains, and the second one the usual ones."""
+    compared: Mapping[Axis, Array]
+    """Overshoot, settling time and error at rest by axis, 1 being those of the usual gains, also of gains that lost."""
+    usual: Mapping[str, float]
+    """The gains that were to be beaten, by the same names."""
+    whose: str
+    """Whose they are: `the firmware's` or `your`."""
 
 
 def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
-    """Return the gains of a vehicle after a flight, also of vehicles with other lags and thrusts, and of draws.
+    """Return the gains of a vehicle that win a flight, also of vehicles with other lags and thrusts, and of draws.
 
-    - `given`: a file of parameters, whose gains are flown in place of the rule's.
+    - `given`: a file of parameters with the gains that the vehicle has, which are to be beaten; the default is those of
+      the firmware.
 
         tuned(load_vehicle(find_vehicle("bluerov2"))).gains["ATC_RAT_YAW_P"]
 
-    Raises InputError if ArduSub has no frame for the thrusters, or if no axis has gains of its own; FileError about
-    given gains, also if they chatter or are not stable; and BuildError without an engine.
+    Raises InputError if ArduSub has no frame for the thrusters, or if no axis has gains that win; FileError about given
+    gains; and BuildError without an engine.
     """
     mixer, axes = Mixer(vehicle), [axis for axis in ROWS if vehicle.layout.has(axis)]
-    usual, owner = read_gains(given) if given else (FIRMWARE, "")
-    whose = f"has the gains of {owner}; " if owner not in ("", vehicle.identifier) else ""
-    notes = [f"{given}: {whose}the vehicle is {vehicle.identifier}"] if whose else []
-    notes += [vehicle.caution] if vehicle.caution else []
-    why = dict.fromkeys(axes, "as given") if given else {axis: _refusal(vehicle, mixer, axis) for axis in axes}
-    shares = dict.fromkeys(axes, 1.0)
+    own, owner = read_gains(given) if given else ({}, "")
+    usual, whose = FIRMWARE | own, "your" if given else "the firmware's"
+    why = {axis: _refusal(vehicle, mixer, axis) for axis in axes}
+    margins = {axis: _margin(vehicle, mixer, axis) for axis in axes if not why[axis]}
+    shares, judged = dict.fromkeys(axes, 1.0), dict[Axis, Array]()
     push = mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0
     legs = [leg for leg in LEGS if leg.axis in (SURGE, *axes)]
 
     def flight(others: Sequence[tuple[Mapping[str, float], float]], gains: Mapping[str, float]) -> list[FlownLeg]:
-        """Fly vehicles with delays. The second one has the firmware's gains; those after it are loaded."""
-        flying = {name: np.where(np.arange(len(others)) == 1, FIRMWARE[name], value) for name, value in gains.items()}
+        """Fly vehicles with delays. The second one has the usual gains; those after it are loaded."""
+        flying = {n: np.where(np.arange(len(others)) == 1, x, gains.get(n, x)) for n, x in usual.items()}
         loads = np.where(np.arange(len(others)) < 2, 0.0, push)
         return [*fly(vehicle, flying, legs, [one for one, _ in others], loads, [delay for _, delay in others])]
 
-    def gains_along(axis: Axis) -> dict[str, tuple[float, str]]:
-        if given:
-            return {name: (usual.get(name, FIRMWARE[name]), "as given") for name in FIRMWARE if ROWS[axis] in name}
-        return {} if why[axis] else _rule(vehicle, mixer, axis, shares[axis])
-
     while True:
-        gains = {name: gain for axis in axes for name, gain in gains_along(axis).items()}
-        if not gains:
+        rules = {
+            axis: [_rule(vehicle, mixer, axis, shares[axis], margins[axis], one) for one in _CHOICES]
+            for axis in margins
+            if not why[axis]
+        }
+        if not rules:
             reasons = listed(f"{axis.name}: {words}" for axis, words in why.items())
             raise InputError(f"{vehicle.identifier}: there are no gains to load: {reasons}")
-        flown = flight(_variations(vehicle), {name: value for name, (value, _) in gains.items()})
-        flaws = {axis: words for axis, words in _flaws(flown).items() if given or not why.get(axis, "no axis")}
-        if given and flaws:
-            raise FileError(f"{given}: {whose}on {vehicle.identifier} {listed(flaws.values())}")
-        if not flaws:
-            break
+        chosen, costs = dict.fromkeys(rules, 0), dict[Axis, float]()
+        compared = _compared(vehicle, legs, rules, usual)
+        for axis, ratios in compared.items():
+            of_choices = np.where(ratios.max(axis=0) <= _WORST, ratios.mean(axis=0), inf)
+            chosen[axis] = int((ratios.mean(axis=0) if min(of_choices) == inf else of_choices).argmin())
+            costs[axis], compared[axis] = of_choices[chosen[axis]], ratios[:, chosen[axis]]
+        gains = {name: gain for axis, choices in rules.items() for name, gain in choices[chosen[axis]].items()}
+        values = {name: value for name, (value, _) in gains.items()}
+        flown = flight(_variations(vehicle, margins), values)
+        flaws = {axis: words for axis, words in _flaws(flown).items() if axis in rules}
+        lost = [] if flaws else [axis for axis, cost in costs.items() if not cost < 1.0]
         for axis, words in flaws.items():
             shares[axis] *= _LOWER
             if shares[axis] < _LEAST:
                 why[axis] = f"with {_LEAST:.0%} of the rule's gains, {words}"
-    if not given:
-        notes += [f"{axis.name}: left out, so that it keeps its gains: {words}" for axis, words in why.items() if words]
+        why |= {axis: _LOST.format(*compared[axis], whose) for axis in lost}
+        judged |= compared
+        if not (flaws or lost):
+            break
+    notes = [f"{given}: has the gains of {owner}; the vehicle is {vehicle.identifier}"] if owner else []
+    notes = notes if owner != vehicle.identifier else []
+    notes += [vehicle.caution] if vehicle.caution else []
+    notes += [f"{axis.name}: left out, so that it keeps its gains: {words}" for axis, words in why.items() if words]
     notes += [
-        f"{axis.name}: the gains are {share:.0%} of the rule's, so that nothing chatters and all is stable"
-        for axis, share in shares.items()
-        if share < 1.0 and not why[axis]
+        f"{axis.name}: the gains are {shares[axis]:.0%} of the rule's, so that nothing chatters and all is stable"
+        for axis in rules
+        if shares[axis] < 1.0
     ]
-    notes += [f"the firmware's gains are not recommended: {words}" for words in _flaws(flown, 1).values()]
-    notes += [*_losses(vehicle, flown)]
-    if not given:
-        held, own = {a for a in axes if not why[a]}, {name: value for name, (value, _) in gains.items()}
-        bearing = flight([*(({}, DELAY),) * 2, *(({}, delay) for delay in _DELAYS)], own)
-        borne = [*takewhile(lambda n: held.isdisjoint(_flaws(bearing, n)), range(2, 2 + len(_DELAYS)))]
-        most = 1e3 * ([DELAY, *_DELAYS][len(borne)])
-        notes.append(f"the gains bear {most:.0f} ms from the sensors to the thrust; {1e3 * DELAY:.0f} ms are assumed")
-    return Tuned(vehicle, mixer.frame, gains, notes, [leg.of_first(2) for leg in flown])
+    notes += [f"{whose} gains are not recommended: {words}" for words in _flaws(flown, 1).values()]
+    fast, delays = _corner(vehicle, margins, 1), len(_DELAYS)
+    late = [(one, delay) for one in ({}, fast) for delay in _DELAYS]
+    flown_late = flight([({}, DELAY), ({}, DELAY), (_lag_ends(vehicle), DELAY), *late], values)
+    calm = [rules.keys().isdisjoint(_flaws(flown_late, n)) for n in range(3, 3 + len(late))]
+    own_delay, fast_delay = (
+        1e3 * [DELAY, *_DELAYS][[*some, False].index(False)] for some in (calm[:delays], calm[delays:])
+    )
+    notes.append(
+        f"the gains bear {own_delay:.0f} ms from the sensors to the thrust with the vehicle of the file, and "
+        f"{fast_delay:.0f} ms with more acceleration per command "
+        f"({listed(f'{axis.name} {margins[axis]:.2f} times' for axis in rules)}); {1e3 * DELAY:.0f} ms are assumed"
+    )
+    rows = figures(vehicle, [leg.of(2, 0) for leg in flown_late]) if vehicle.unknown_lags else ()
+    longer = [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows if row[0] in rules]
+    notes += [f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"] if longer else []
+    return Tuned(vehicle, mixer.frame, gains, notes, [leg.of(0, 1) for leg in flown], judged, usual, whose)
 
 
-def _losses(vehicle: Vehicle, flown: Sequence[FlownLeg]) -> Iterator[str]:
-    """Yield where the gains settle later than the firmware's, by 0.2 s at least."""
-    for title, _, (_, (new, old), *_) in figures(vehicle, flown):
-        if new > old + 0.2:
-            words = "do not settle" if new == inf else f"settle after {new:.2g} s"
-            yield f"{title}: these gains {words}, and the firmware's after {old:.2g} s"
+def _compared(
+    vehicle: Vehicle,
+    legs: Sequence[Leg],
+    rules: Mapping[Axis, Sequence[Mapping[str, tuple[float, str]]]],
+    usual: Mapping[str, float],
+) -> dict[Axis, Array]:
+    """Return overshoot, settling time and error at rest by axis for each choice of the rules (3 x choices).
+
+    1 is that of the usual gains, of all steps along the axis. They fly with DELAY and with 20 ms more, because where a
+    heading rests in the dead band differs from leg to leg. What nobody sees does not count: a tenth of what is settled.
+    """
+    count = 1 + len(_CHOICES)
+    flying = {name: np.full(2 * count, value) for name, value in usual.items()}
+    for rule in rules.values():
+        flying |= {n: np.tile([usual[n], *(one[n][0] for one in rule)], 2) for n in rule[0]}
+    delays = np.repeat([DELAY, DELAY + 0.02], count).tolist()
+    flown = [*fly(vehicle, flying, legs, [{}] * (2 * count), 0.0, delays)]
+    sums = dict[Axis, Array]()
+    for one in flown:
+        for axis, _, _, cells in figures(vehicle, [one]):
+            if axis in rules and one.leg.axis is axis:
+                least = 0.1 * SHOWN[axis][2] * SHOWN[axis][4]
+                bounds = (least, inf), (0.0, one.leg.seconds), (least, inf)
+                counted = [np.clip(cell, *bound) for cell, bound in zip(cells, bounds, strict=False)]
+                sums[axis] = sums.get(axis, 0.0) + np.reshape(counted, (3, 2, count))
+    return {axis: total.sum(axis=1)[:, 1:] / total.sum(axis=1)[:, :1] for axis, total in sums.items()}
 
 
 def _refusal(vehicle: Vehicle, mixer: Mixer, axis: Axis) -> str:
@@ -186,13 +257,13 @@ def _strength(vehicle: Vehicle, mixer: Mixer, axis: Axis) -> float:
     return max(abs(mixer.push(vehicle, axis, demand)) for demand in (0.3, -0.3)) / 0.3
 
 
-def _rule(vehicle: Vehicle, mixer: Mixer, axis: Axis, share: float) -> dict[str, tuple[float, str]]:
-    """Return the gains of an axis with their reasons: a share of those of the rule."""
+def _rule(
+    vehicle: Vehicle, mixer: Mixer, axis: Axis, share: float, margin: float, choice: tuple[float, float]
+) -> dict[str, tuple[float, str]]:
+    """Return the gains of an axis with their reasons: a share of those of the rule, with one of _CHOICES for yaw."""
     inertia, k = vehicle.effective_inertia(axis), _strength(vehicle, mixer, axis)
-    curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(axis)}
-    lag = max(vehicle[curve.coefficient("T")] for curve in curves)
+    lag, dead = lag_along(vehicle, axis), vehicle.coefficients.get("T_d", 0.0)
     lowered = f"; {share:.0%} of it, so that it does not chatter" if share < 1.0 else ""
-    dead = vehicle.coefficients.get("T_d", 0.0)
     behind = f", T = {lag:.3g} s" + (f", T_d = {dead:.3g} s" if dead else "")
     if axis is HEAVE:
         p, climb = share * 0.8 * inertia / (0.2 * k), min(FIRMWARE["PSC_VELZ_P"], 0.88 / (lag + dead))
@@ -204,43 +275,65 @@ def _rule(vehicle: Vehicle, mixer: Mixer, axis: Axis, share: float) -> dict[str,
             "PSC_POSZ_P": (min(2.0, climb / 4.0), "a quarter of PSC_VELZ_P, at most 2, for less overshoot"),
             "PSC_VELZ_P": (climb, f"min(8/s, 0.88/(T + T_d)){behind}"),
         }
-    speed = share * min(2.8 / lag, 0.315 / (dead + 0.02 + DELAY))
+    ratio, integral = choice if axis is YAW else _OF_TILT
+    chosen = ", chosen by flights" if axis is YAW else ""
+    speed = share * min(2.8 / lag, 0.585 / (margin * (dead + 0.02 + DELAY)))
     p = speed * inertia / k
-    rule = f"k_v = min(2.8/T, 0.315/(T_d + 35 ms)){behind}"
-    reason = f"k_v J/k, J = {inertia:.3g} kg.m2, k = {k:.3g} N.m, {rule}{lowered}"
+    rule = f"k_v = min(2.8/T, 0.585/({margin:.2f} (T_d + 35 ms))){behind}"
     return {
-        f"ATC_RAT_{ROWS[axis]}_P": (p, reason),
+        f"ATC_RAT_{ROWS[axis]}_P": (p, f"k_v J/k, J = {inertia:.3g} kg.m2, k = {k:.3g} N.m, {rule}{lowered}"),
         f"ATC_RAT_{ROWS[axis]}_I": (
-            0.5 * p,
-            "0.5/s of P, against steady moments and the dead band",
+            integral * p,
+            f"{integral:g}/s of P, against steady moments and the dead band{chosen}",
         ),
         f"ATC_RAT_{ROWS[axis]}_D": (0.5 * lag * p, "0.5 T of P, against the lag"),
-        f"ATC_ANG_{ROWS[axis]}_P": (speed / 2.5, "k_v/2.5"),
+        f"ATC_ANG_{ROWS[axis]}_P": (speed / ratio, f"k_v/{ratio:g}{chosen}"),
     }
 
 
-def _variations(vehicle: Vehicle) -> list[tuple[dict[str, float], float]]:
+def _margin(vehicle: Vehicle, mixer: Mixer, axis: Axis) -> float:
+    """Return by what the acceleration per demand may be larger than the file says: 30 % more thrust and less inertia.
+
+    Of an identified vehicle, it is the end of what the intervals leave open (97.5 %), at least 20 %. Roll and pitch,
+    whose steps were not flown, have the wide one.
+    """
+    known = vehicle.uncertainty
+    if not (vehicle.provenance and known.names) or axis in (ROLL, PITCH):
+        return _CORNER
+    drawn = known.drawn(np.random.default_rng(1).random((64, len(known.names)))).tolist()
+    others = [vehicle, *(vehicle.with_(**dict(zip(known.names, one, strict=True))) for one in drawn)]
+    own, *rest = (_strength(one, mixer, axis) / one.effective_inertia(axis) for one in others)
+    return max(_LEAST_CORNER, float(np.quantile(rest, 0.975)) / own)
+
+
+def _corner(vehicle: Vehicle, margins: Mapping[Axis, float], thrust: int, inertia: int = 0) -> dict[str, float]:
+    """Return the coefficients of a vehicle with more (1) or less (-1) thrust and inertia, as far as the margins go."""
+    inertia = inertia or -thrust
+    return {
+        name: x
+        for axis in vehicle.layout.bare_axes
+        for part in [sqrt(margins.get(axis, _CORNER))]
+        for name, x in scaled(vehicle, axis, part**thrust, part**inertia).items()
+    }
+
+
+def _lag_ends(vehicle: Vehicle) -> dict[str, float]:
+    """Return the longest lags: 30 % more than in the file, or the far ends of their intervals."""
+    known = vehicle.uncertainty
+    lags = {c.coefficient("T"): 1.3 * vehicle[c.coefficient("T")] for c in vehicle.layout.curves if c.has_lag}
+    ends = dict(zip(known.names, known.at(np.full(len(known.names), _FAR)).tolist(), strict=True))
+    return {name: max(lag, ends.get(name, lag)) for name, lag in lags.items()}
+
+
+def _variations(vehicle: Vehicle, margins: Mapping[Axis, float]) -> list[tuple[dict[str, float], float]]:
     """Return the coefficients of the vehicles that fly, where they are not those of the file, each with its delay (s).
 
-    Three are as in the file. Then come all corners of 30 % more or less thrust and inertia with 20 ms, the fastest of
-    them without delay, and two with more lag: by 30 %, or the far end of its interval. Others are drawn.
+    Three are as in the file. Then come all corners of more and less thrust and inertia with 20 ms, the fastest of them
+    without delay, and two with more lag. Others are drawn.
     """
-    known, layout = vehicle.uncertainty, vehicle.layout
-    lags = {curve.coefficient("T"): 1.3 * vehicle[curve.coefficient("T")] for curve in layout.curves if curve.has_lag}
-    ends = dict(zip(known.names, known.at(np.full(len(known.names), _FAR)).tolist(), strict=True))
-    lags = {name: max(lag, ends.get(name, lag)) for name, lag in lags.items()}
-
-    def corner(thrust: float, inertia: float) -> dict[str, float]:
-        by = (("alpha", thrust), ("beta", 1.0 / inertia))
-        return {
-            name: factor * vehicle[name]
-            for a in layout.bare_axes
-            for key, factor in by
-            for name in [a.coefficient(key)]
-        }
-
-    fast, slow = corner(1.3, 0.7), corner(0.7, 1.3)
-    corners = [(corner(thrust, inertia), 0.02) for thrust in (1.3, 0.7) for inertia in (0.7, 1.3)]
+    known, lags = vehicle.uncertainty, _lag_ends(vehicle)
+    fast, slow = (_corner(vehicle, margins, thrust) for thrust in (1, -1))
+    corners = [(_corner(vehicle, margins, thrust, inertia), 0.02) for thrust in (1, -1) for inertia in (-1, 1)]
     drawn = known.drawn(np.random.default_rng(0).random((_DRAWS * bool(known.names), len(known.names)))).tolist()
     return [
         *(({}, DELAY),) * 3,
@@ -270,27 +363,24 @@ def _flaws(flown: Sequence[FlownLeg], which: int | None = None) -> dict[Axis, st
     return flaws
 
 
-def figures(vehicle: Vehicle, legs: Sequence[FlownLeg]) -> Iterator[tuple[str, str, Array]]:
-    """Yield for each leg what it is, its unit, and FIGURES with these gains and with the firmware's (4 x 2).
+def figures(vehicle: Vehicle, legs: Sequence[FlownLeg]) -> Iterator[tuple[Axis, str, str, Array]]:
+    """Yield for each leg and axis what it is, its unit, and FIGURES of the vehicles (4 x vehicles).
 
     The overshoot is the largest error beyond the target; ahead, the largest error. The vehicle is settled when it stays
     within 5 cm or 2 deg, s. The error at rest is that of the last 2 s, RMS. The changes of the commands in a second, 1
     being the full command, are the mean over the thrusters.
     """
-    for flown in legs[1:]:
+    for flown in legs:
         leg = flown.leg
-        changes = np.abs(np.diff(flown.fractions[..., :2], axis=0)).mean(axis=1).sum(axis=0) / leg.seconds
+        changes = np.abs(np.diff(flown.fractions, axis=0)).mean(axis=1).sum(axis=0) / leg.seconds
         for axis, (words, row, scale, unit, within) in SHOWN.items():
-            if not vehicle.layout.has(axis) or leg.axis not in (axis, SURGE):
+            if not vehicle.layout.has(axis) or leg.axis not in (axis, SURGE) or leg == BEFORE or not leg.size:
                 continue
-            errors = flown.errors[:, row, :2]
-            settled = (RATE * leg.seconds - (np.abs(errors[::-1]) > within).argmax(axis=0)) / RATE
-            settled[np.abs(errors[-1]) > within] = inf
-            over, title = (errors * np.sign(leg.size)).max(axis=0).clip(0.0), f"{words} {scale * leg.size:+.0f} {unit}"
-            if leg.axis is SURGE:
-                settled, over, title = np.full(2, nan), np.abs(errors).max(axis=0), f"{leg.size:.0%} ahead: {words}"
-            rest = np.sqrt((errors[-REST:] ** 2).mean(axis=0))
-            yield title, unit, np.array([scale * over, settled, scale * rest, changes])
+            ahead = leg.axis is SURGE
+            found = step_figures(flown.errors[:, row], 0.0 if ahead else leg.size, 1.0 / RATE, within)
+            title = f"{leg.size:.0%} ahead: {words}" if ahead else f"{words} {scale * leg.size:+.0f} {unit}"
+            settled = np.full_like(found.settled, nan) if ahead else found.settled
+            yield axis, title, unit, np.array([scale * found.overshoot, settled, scale * found.rest, changes])
 
 
 def read_gains(path: Path) -> tuple[dict[str, float], str]:

@@ -3,8 +3,9 @@
 It follows ArduPilot's sources: `AP_Motors6DOF.cpp` (the factors of the frame `vectored_6dof`, and the mixing),
 `AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp` (the cascades). It leaves out the filter that estimates
 the state, and the shaping of targets; `flights.py` flies it with noisy estimates, and writes logs. `Hold.by` has other
-gains, and the filters of the sensors. It shares no code with `rov_fmu/bridges/ardusub/`, which makes such gains.
-`fmu_src/autopilot/` has these loops in C, and the tests compare the two.
+gains, the filters of the sensors, and a heading that moves to its target (`AC_AttitudeControl.cpp`). It shares no code
+with `rov_fmu/bridges/ardusub/`, which makes such gains. `fmu_src/autopilot/` has these loops in C, and the tests
+compare the two.
 """
 
 from collections.abc import Mapping
@@ -135,6 +136,10 @@ class Hold:
     """PSC_POSZ_P."""
     sensors: list[Biquad] = field(default_factory=lambda: [Biquad(0.0) for _ in range(4)])
     """The filters of the rates and of the acceleration."""
+    slew: float = 0.0
+    """The largest rate of the target of the heading (ATC_SLEW_YAW), rad/s; with 0, a new heading is one at once."""
+    _target: tuple[float, float] | None = None
+    """The target of the heading, and its rate."""
 
     @classmethod
     def by(cls, gains: Mapping[str, float], **others: Any) -> Self:
@@ -147,15 +152,28 @@ class Hold:
         hold.climb.p, hold.depth_gain = gains.get("PSC_VELZ_P", 8.0), gains.get("PSC_POSZ_P", 3.0)
         roll, pitch, yaw = (gains.get(f"ATC_ANG_{turn}_P", 6.0) for turn in turns)
         hold.angles, hold.sensors = (roll, pitch, yaw), [Biquad(20.0) for _ in range(4)]
+        hold.slew = radians(60.0)
         return hold
+
+    def _heading(self, dt: float) -> tuple[float, float]:
+        """Return the target of the heading and its rate, as input_shaping_angle moves it to a new heading: with
+        ATC_INPUT_TC, 0.15 s, and at most ATC_ACCEL_Y_MAX, 1100 deg/s2."""
+        if not self.slew:
+            return self.heading, 0.0
+        (at, rate), most = self._target or (self.heading, 0.0), radians(1100.0)
+        wanted = max(-self.slew, min(self.slew, sqrt_controller(self.heading - at, 1.0 / 0.15, most)))
+        rate = max(rate - most * dt, min(rate + most * dt, wanted))
+        self._target = at + rate * dt, rate
+        return self._target
 
     def outputs(self, motion: Motion, forward: float, lateral: float, dt: float) -> list[float]:
         """Return the outputs of the motors from -1 to 1, for sticks from -1 to 1 and a step of dt seconds."""
         phi, theta, psi = motion.attitude
-        error = (self.heading - psi + pi) % (2 * pi) - pi
+        target, target_rate = self._heading(dt)
+        error = (target - psi + pi) % (2 * pi) - pi
         most = radians(120.0)  # AC_ATTITUDE_ACCEL_Y_CONTROLLER_MAX_RADSS, which also limits the error
         of_roll, of_pitch, of_yaw = self.angles
-        yaw_rate = sqrt_controller(max(-most / of_yaw, min(most / of_yaw, error)), of_yaw, most)
+        yaw_rate = sqrt_controller(max(-most / of_yaw, min(most / of_yaw, error)), of_yaw, most) + target_rate
         wanted = (-of_roll * phi, -of_pitch * theta, yaw_rate)
         rates = [sensor(rate, dt) for sensor, rate in zip(self.sensors, motion.rates, strict=False)]
         roll, pitch, yaw = (
