@@ -89,7 +89,7 @@ def aims_of(pilot: Pilot, seen: Mapping[str, Array], h: float) -> dict[str, Aim]
     return aims
 
 
-def scaled(vehicle: Vehicle, axis: Axis, thrust: float, inertia: float) -> dict[str, float]:
+def scaled_axis(vehicle: Vehicle, axis: Axis, thrust: float, inertia: float) -> dict[str, float]:
     """Return the coefficients of a vehicle whose thrust and inertia along an axis are multiplied by factors."""
     by = (("alpha", thrust), ("beta", 1.0 / inertia))
     return {name: factor * vehicle[name] for key, factor in by for name in [axis.coefficient(key)]}
@@ -113,7 +113,7 @@ def first_holds(autopilot: Autopilot) -> dict[Axis, tuple[StepFigures, float]]:
     others = [start, start | current, start]
     for by in ((thrust, inertia) for thrust in parts for inertia in parts):
         others.append(
-            start | {k: x for axis in vehicle.layout.bare_axes for k, x in scaled(vehicle, axis, *by).items()}
+            start | {k: x for axis in vehicle.layout.bare_axes for k, x in scaled_axis(vehicle, axis, *by).items()}
         )
     held = [axis for axis in autopilot.axes if axis in (*STEPS, ROLL, PITCH)]
     aims = {axis: size for axis, (size, _) in STEPS.items() if axis in held}

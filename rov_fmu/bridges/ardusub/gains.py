@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.autopilot.ardusub import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
-from rov_fmu.autopilot.figures import scaled, step_figures
+from rov_fmu.autopilot.figures import scaled_axis, step_figures
 from rov_fmu.autopilot.gains import lag_along
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
@@ -313,7 +313,7 @@ def _corner(vehicle: Vehicle, margins: Mapping[Axis, float], thrust: int, inerti
         name: x
         for axis in vehicle.layout.bare_axes
         for part in [sqrt(margins.get(axis, _CORNER))]
-        for name, x in scaled(vehicle, axis, part**thrust, part**inertia).items()
+        for name, x in scaled_axis(vehicle, axis, part**thrust, part**inertia).items()
     }
 
 

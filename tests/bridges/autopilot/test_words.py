@@ -46,17 +46,6 @@ def test_the_gains_are_printed_on_a_screen() -> None:
     assert max(map(len, lines)) < 100
 
 
-def test_a_hold_that_begins_overshoots_as_the_page_says() -> None:
-    page = (ROOT / "docs" / "autopilot.md").read_text(encoding="utf-8")
-    assert "the first step overshoots by up to 6 cm, or 6° of a heading of 90°" in page
-    for name in ("videoray", "bluerov2", "bluerov2_heavy"):
-        rov = rov_fmu.load(name)
-        depth = rov.hold(15.0, depth=3.0, start={"z": 2.0})["z"].max() - 3.0
-        heading = rov.hold(15.0, heading=np.pi / 2)["psi"].max() - np.pi / 2
-        assert depth < 0.065
-        assert np.degrees(heading) < 6.0
-
-
 def test_a_terminal_that_a_vehicle_lacks_says_what_to_write() -> None:
     layout = replace(SIX.layout, waves=False)
     content = native_content(SIX.with_(layout), interface="cs").files
