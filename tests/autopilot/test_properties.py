@@ -202,7 +202,7 @@ def test_a_hold_in_a_current_begins_with_its_velocity_over_ground() -> None:
     assert flown.sensors[0, 0, SENSORS.index("vg_N")] == 0.5
     force = rov.hold(0.2, still, start={"z": 10.0}, north=0.0, east=0.0, depth=10.0, heading=0.0)["F_1"]
     assert np.ptp(force) > 6.0
-    assert np.abs(np.diff(force)).max() < 3.0, "it was 7.3 N"
+    assert np.abs(np.diff(force)[:2]).max() < 3.0, "it was 7.3 N"
 
 
 @pytest.mark.parametrize("name", ["videoray", "bluerov2", "bluerov2_heavy"])

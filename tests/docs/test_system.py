@@ -160,7 +160,7 @@ def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.Mo
     path.write_text(block, encoding="utf-8")
     plan = load_system_plan(path)
     found = system.made(plan, path)
-    assert {start[0] for start, _, _ in found.connections} == {"rov", "tether", "water", "autopilot"}
+    assert {start[0] for start, *_ in found.connections} == {"rov", "tether", "water", "autopilot"}
     assert [*system.unconnected(plan, found)] == [
         "rov: nothing is connected to X_ext, Z_ext and N_ext, which keep their start values",
         "tether: nothing is connected to y_top, z_top, vg_N_top, vg_E_top and vg_D_top, which keep their start values",

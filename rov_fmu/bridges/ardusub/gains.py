@@ -202,9 +202,11 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
         f"{fast_delay:.0f} ms with more acceleration per command "
         f"({listed(f'{axis.name} {margins[axis]:.2f} times' for axis in rules)}); {1e3 * DELAY:.0f} ms are assumed"
     )
-    rows = figures(vehicle, [leg.of(2, 0) for leg in flown_late]) if vehicle.unknown_lags else ()
-    longer = [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows if row[0] in rules]
-    notes += [f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"] if longer else []
+    if vehicle.unknown_lags:
+        rows = figures(vehicle, [leg.of(2, 0) for leg in flown_late])
+        longer = [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows if row[0] in rules]
+        notes.append(f"the gains are for a lag of {max(lag_along(vehicle, axis) for axis in rules):.2g} s")
+        notes += [f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"] * bool(longer)
     return Tuned(vehicle, mixer.frame, gains, notes, [leg.of(0, 1) for leg in flown], judged, usual, whose)
 
 
