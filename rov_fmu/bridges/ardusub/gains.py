@@ -20,7 +20,7 @@ chatters. What does not beat the gains that the vehicle has is left out.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, inf, nan, radians, sqrt
 from pathlib import Path
@@ -203,11 +203,16 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
         f"({listed(f'{axis.name} {margins[axis]:.2f} times' for axis in rules)}); {1e3 * DELAY:.0f} ms are assumed"
     )
     if vehicle.unknown_lags:
-        rows = figures(vehicle, [leg.of(2, 0) for leg in flown_late])
-        longer = [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows if row[0] in rules]
-        notes.append(f"the gains are for a lag of {max(lag_along(vehicle, axis) for axis in rules):.2g} s")
-        notes += [f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"] * bool(longer)
+        notes += _words_on_lags(vehicle, rules, [leg.of(2, 0) for leg in flown_late])
     return Tuned(vehicle, mixer.frame, gains, notes, [leg.of(0, 1) for leg in flown], judged, usual, whose)
+
+
+def _words_on_lags(vehicle: Vehicle, axes: Collection[Axis], flown: Sequence[FlownLeg]) -> Iterator[str]:
+    """Yield for which lag the gains are, and what the longest one costs, which was flown beside that of the file."""
+    yield f"the gains are for a lag of {max(lag_along(vehicle, axis) for axis in axes):.2g} s"
+    rows = [row for row in figures(vehicle, flown) if row[0] in axes]
+    if longer := [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows]:
+        yield f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"
 
 
 def _compared(
