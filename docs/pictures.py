@@ -88,7 +88,8 @@ def _system(folder: Path) -> bytes:
 def _plan_of(page: str, word: str) -> str:
     """Return the first plan in a page that has a word."""
     text = (HERE / page).read_text(encoding="utf-8")
-    return next(one for one in re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL) if word in one)
+    plans: list[str] = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return next(one for one in plans if word in one)
 
 
 def _plan(page: str, folder: Path, name: str, more: str = "") -> None:

@@ -14,7 +14,8 @@ from rov_fmu.bridges import mujoco
 from rov_fmu.bridges.autopilot import files as autopilot_export
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
 from rov_fmu.c.compile import host_platform
-from rov_fmu.cli import _commands, main
+from rov_fmu.cli import main
+from rov_fmu.interface.export_command import EXPORTS
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleWarning, load_vehicle
 from tests.commands import FILES, WRITING, Capsys
@@ -52,7 +53,6 @@ TELLING = {
 }
 """The arguments and options of commands by which a vehicle comes in, but for those of `export`."""
 TELLING |= {("simulate", "--find"): "simulate harbour.toml --find heave=0.3"}
-EXPORTS = next(p.type.choices for p in _commands.commands["export"].params if p.name == "to")
 TELLING |= {("export", to): f"export harbour.toml --to {to}" for to in EXPORTS}
 SILENT = {
     ("simulate", "vehicle"),

@@ -50,7 +50,8 @@ def most_with(figure: str, results: Results) -> str:
     """Return the parameter that varied most with a figure, by Spearman's correlation as SciPy computes it."""
     runs = results.runs.dropna(subset=[figure])
     varied = [name for name in results.parameters if runs[name].nunique() > 1]
-    return max(varied, key=lambda name: abs(spearmanr(runs[figure], runs[name]).statistic))
+    most: str = max(varied, key=lambda name: float(abs(spearmanr(runs[figure], runs[name]).statistic)))
+    return most
 
 
 @pytest.fixture(scope="module")

@@ -212,7 +212,7 @@ def begun(path: Path, fmi: int, values: dict[str, float]) -> tuple[Any, dict[str
 
 @pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
 def test_python_flies_as_the_flights_in_c_do(name: str) -> None:
-    result = rov_fmu.load(name).hold(STEPS * 0.02, {}, start={"z": 10.0}, step=0.02, **AIMS)
+    result = rov_fmu.load(name).hold(STEPS * 0.02, {}, start={"z": 10.0}, step=0.02, gains={}, **AIMS)
     seen = by_flights(autopilot_of(load_vehicle(SHIPPED[name])))
     for variable in ("z", "psi", "u"):
         assert result[variable][:STEPS] == pytest.approx(seen[:, SENSORS.index(variable)], abs=1e-9)

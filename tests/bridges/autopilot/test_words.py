@@ -90,5 +90,5 @@ def test_the_page_says_which_mean_period_is_longer() -> None:
         whole, cut = ([np.trapezoid((density * ratio**k)[some], ratio[some]) for k in (0, n)] for some in
                       (slice(None), ratio <= 4.0))  # fmt: skip
         longer.append((cut[0] / cut[1] / (whole[0] / whole[1])) ** (1.0 / n) - 1.0)
-    assert [round(100.0 * one) for one in longer] == [1, 3]
+    assert [f"{100.0 * one:.0f}" for one in longer] == ["1", "3"]
     assert "T_m02 3 % longer, and T_m01 1 %" in (ROOT / "docs" / "waves.md").read_text(encoding="utf-8")
