@@ -92,9 +92,9 @@ def _plan_of(page: str, word: str) -> str:
     return next(one for one in plans if word in one)
 
 
-def _plan(page: str, folder: Path, name: str, more: str = "") -> None:
-    """Run the first system that a page describes, with more lines at its top."""
-    plan = more + _plan_of(page, "component")
+def _plan(page: str, folder: Path, name: str) -> None:
+    """Run the first system that a page describes."""
+    plan = _plan_of(page, "component")
     heavy = (ROOT / "models/bluerov2_heavy/bluerov2_heavy.toml").read_text(encoding="utf-8")
     shutil.copytree(ROOT / "models/bluerov2_heavy", folder, dirs_exist_ok=True)
     (folder / "my_rov.toml").write_text(f"waves = true\n{heavy}", encoding="utf-8")
@@ -109,11 +109,8 @@ def _tether(folder: Path) -> bytes:
 
 
 def _waves(folder: Path) -> bytes:
-    _plan("waves.md", folder, "sea", f"plot = {_IN_WAVES}\n".replace("'", '"'))
+    _plan("waves.md", folder, "sea")
     return (folder / "sea.svg").read_bytes()
-
-
-_IN_WAVES = ["sea.elevation", "rov.x", "rov.y", "rov.z", "autopilot.u_1", "autopilot.u_5"]
 
 
 def _flight(folder: Path) -> bytes:

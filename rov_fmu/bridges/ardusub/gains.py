@@ -20,7 +20,7 @@ chatters. What does not beat the gains that the vehicle has is left out.
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, inf, nan, radians, sqrt
 from pathlib import Path
@@ -161,27 +161,26 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
         if not rules:
             reasons = listed(f"{axis.name}: {words}" for axis, words in why.items())
             raise InputError(f"{vehicle.identifier}: there are no gains to load: {reasons}")
-        chosen, costs = dict.fromkeys(rules, 0), dict[Axis, float]()
-        compared = _compared(vehicle, legs, rules, usual)
-        for axis, ratios in compared.items():
-            of_choices = np.where(ratios.max(axis=0) <= _WORST, ratios.mean(axis=0), inf)
-            chosen[axis] = int((ratios.mean(axis=0) if min(of_choices) == inf else of_choices).argmin())
-            costs[axis], compared[axis] = of_choices[chosen[axis]], ratios[:, chosen[axis]]
-        gains = {name: gain for axis, choices in rules.items() for name, gain in choices[chosen[axis]].items()}
+        chosen = {axis: choices[0] for axis, choices in rules.items()}
+        lost = list[Axis]()
+        for axis, ratios in _compared(vehicle, legs, rules, usual).items():
+            costs = ratios.mean(axis=0) + 10.0 * (ratios.max(axis=0) > _WORST)
+            best = int(costs.argmin())
+            chosen[axis], judged[axis] = rules[axis][best], ratios[:, best]
+            lost += [] if costs[best] < 1.0 else [axis]
+        gains = {name: gain for rule in chosen.values() for name, gain in rule.items()}
         values = {name: value for name, (value, _) in gains.items()}
         flown = flight(_variations(vehicle, margins), values)
         flaws = {axis: words for axis, words in _flaws(flown).items() if axis in rules}
-        lost = [] if flaws else [axis for axis, cost in costs.items() if not cost < 1.0]
         for axis, words in flaws.items():
             shares[axis] *= _LOWER
             if shares[axis] < _LEAST:
                 why[axis] = f"with {_LEAST:.0%} of the rule's gains, {words}"
-        why |= {axis: _LOST.format(*compared[axis], whose) for axis in lost}
-        judged |= compared
+        why |= {} if flaws else {axis: _LOST.format(*judged[axis], whose) for axis in lost}
         if not (flaws or lost):
             break
-    notes = [f"{given}: has the gains of {owner}; the vehicle is {vehicle.identifier}"] if owner else []
-    notes = notes if owner != vehicle.identifier else []
+    others = [owner] if owner not in ("", vehicle.identifier) else []
+    notes = [f"{given}: has the gains of {other}; the vehicle is {vehicle.identifier}" for other in others]
     notes += [vehicle.caution] if vehicle.caution else []
     notes += [f"{axis.name}: left out, so that it keeps its gains: {words}" for axis, words in why.items() if words]
     notes += [
@@ -190,29 +189,32 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
         if shares[axis] < 1.0
     ]
     notes += [f"{whose} gains are not recommended: {words}" for words in _flaws(flown, 1).values()]
-    fast, delays = _corner(vehicle, margins, 1), len(_DELAYS)
-    late = [(one, delay) for one in ({}, fast) for delay in _DELAYS]
-    flown_late = flight([({}, DELAY), ({}, DELAY), (_lag_ends(vehicle), DELAY), *late], values)
-    calm = [rules.keys().isdisjoint(_flaws(flown_late, n)) for n in range(3, 3 + len(late))]
-    own_delay, fast_delay = (
-        1e3 * [DELAY, *_DELAYS][[*some, False].index(False)] for some in (calm[:delays], calm[delays:])
-    )
-    notes.append(
-        f"the gains bear {own_delay:.0f} ms from the sensors to the thrust with the vehicle of the file, and "
-        f"{fast_delay:.0f} ms with more acceleration per command "
-        f"({listed(f'{axis.name} {margins[axis]:.2f} times' for axis in rules)}); {1e3 * DELAY:.0f} ms are assumed"
-    )
-    if vehicle.unknown_lags:
-        notes += _words_on_lags(vehicle, rules, [leg.of(2, 0) for leg in flown_late])
+    notes += _borne(vehicle, [*rules], margins, lambda others: flight([({}, DELAY), *others], values))
     return Tuned(vehicle, mixer.frame, gains, notes, [leg.of(0, 1) for leg in flown], judged, usual, whose)
 
 
-def _words_on_lags(vehicle: Vehicle, axes: Collection[Axis], flown: Sequence[FlownLeg]) -> Iterator[str]:
-    """Yield for which lag the gains are, and what the longest one costs, which was flown beside that of the file."""
-    yield f"the gains are for a lag of {max(lag_along(vehicle, axis) for axis in axes):.2g} s"
-    rows = [row for row in figures(vehicle, flown) if row[0] in axes]
-    if longer := [f"{row[1]} {row[3][0, 0]:.2g} {row[2]} ({row[3][0, 1]:.2g})" for row in rows]:
-        yield f"overshoot with the longest lag, in brackets with that of the file: {listed(longer)}"
+def _borne(
+    vehicle: Vehicle,
+    axes: Sequence[Axis],
+    margins: Mapping[Axis, float],
+    flight: Callable[[Sequence[tuple[Mapping[str, float], float]]], list[FlownLeg]],
+) -> Iterator[str]:
+    """Yield which delays the gains bear with the vehicle and with the fastest one, and what an unknown lag costs."""
+    late = [(one, delay) for one in ({}, _corner(vehicle, margins, 1)) for delay in _DELAYS]
+    flown = flight([({}, DELAY), (_lag_ends(vehicle), DELAY), *late])
+    calm = [{*axes}.isdisjoint(_flaws(flown, n)) for n in range(3, 3 + len(late))]
+    count, beside = len(_DELAYS), ", beside T_d," if "T_d" in vehicle.coefficients else ""
+    own, fast = (1e3 * (DELAY, *_DELAYS)[[*some, False].index(False)] for some in (calm[:count], calm[count:]))
+    yield (
+        f"the gains bear {own:.0f} ms from the sensors to the thrust{beside} with the vehicle of the file, and "
+        f"{fast:.0f} ms with more acceleration per command "
+        f"({listed(f'{axis.name} {margins[axis]:.2f} times' for axis in axes)}); {1e3 * DELAY:.0f} ms are assumed"
+    )
+    if vehicle.unknown_lags:
+        rows = figures(vehicle, [leg.of(2, 0) for leg in flown])
+        over = (f"{title} {x:.2g} {unit} ({y:.2g})" for axis, title, unit, ((x, y), *_) in rows if axis in axes)
+        yield f"the gains are for a lag of {max(lag_along(vehicle, axis) for axis in axes):.2g} s"
+        yield f"overshoot with the longest lag, in brackets with that of the file: {listed(over)}"
 
 
 def _compared(

@@ -311,6 +311,18 @@ def test_a_lag_that_is_not_known_is_told(basis: Basis, told: list[str]) -> None:
     assert vehicle.unknown_lags == told
 
 
+def test_an_export_takes_coefficients_and_a_dead_time_that_the_file_has_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "bluerov2", "--to", "gains", "--set", "T_d=0.02", "--set", "T_t200=0.05"]) == 0
+    table = yaml.safe_load((tmp_path / "bluerov2_gains" / "gains.yaml").read_text(encoding="utf-8"))
+    assert {axis["lag"] for axis in table["axes"].values()} == {0.07}
+    capsys.readouterr()
+    assert main(["export", "bluerov2", "--to", "gains", "--set", "z=2"]) == 2
+    assert capsys.readouterr().err == "rov-fmu: --set z: an export has coefficients alone, such as T_d=0.02\n"
+
+
 def test_the_gains_are_a_table_for_any_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["export", "bluerov2_heavy", "--to", "gains"]) == 0

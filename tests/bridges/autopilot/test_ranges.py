@@ -39,7 +39,7 @@ def test_an_input_beyond_its_range_acts_as_its_end(
     fmu: Fmu, given: Mapping[str, float], acts_as: Mapping[str, float]
 ) -> None:
     """As the warning says. A mode of 1e9 was an index into a table, and ended the importer's process."""
-    commands, times = [*HEAVY.layout.commands, *given], (0.02 * np.arange(20)).tolist()
+    commands, times = [*HEAVY.layout.commands, *given], np.linspace(0.0, 0.38, 20)
     results = [fmu.run(times, {}, commands, start) for start in (given, acts_as)]
     for name in commands:
         assert [*results[0][name]] == [*results[1][name]], name
