@@ -1,6 +1,6 @@
 """The parts of a vehicle without their numbers: axes, thrust curves and tables, thrusters and fins."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sin
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -154,6 +154,12 @@ class Thruster(Actuator):
     def side(self) -> float:
         """1 on the port side, where a force ahead turns the bow to starboard; -1 on the other side; 0 without arm."""
         return {None: 0.0, "port": 1.0, "starboard": -1.0}[self.arm]
+
+    @property
+    def opposite(self) -> "Thruster":
+        """The thruster if it is mounted the other way: it pushes in the opposite direction."""
+        x, y, z = (0.0 - one for one in self.direction.value)
+        return replace(self, direction=self.direction._replace(value=(x, y, z)))
 
     def effect(self, axis: Axis) -> float:
         """Return the force along an axis, or the torque about it, of a thrust of 1 N.

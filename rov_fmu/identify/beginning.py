@@ -27,10 +27,12 @@ from rov_fmu.identify.likelihood.records import (
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.tank.arrays import Array, usual_range
+from rov_fmu.tank.arrays import Array, Flags, usual_range
+from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.description import ROV_FILE, Description, Draft
 from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
+from rov_fmu.tank.inspection.signs import contradictions
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.full_thrust import USUAL_SQUARE
@@ -48,6 +50,9 @@ _NEVER_EXACT = ("white_noise", "coloured_noise")
 """The priors whose deviation must not be 0."""
 _MOST_REASONS = 3
 """The most reasons in a line that refuses a log."""
+_SHORT, _PUSHES, _PUSH, _HOLD = 30.0, 2, 0.04, 0.9
+"""Dives that take less than the first number, s, tell nothing if no axis is pushed so often each way, by such a part of
+full command for such a time, s: good logs take 49 s or more."""
 _UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
 _QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
@@ -97,6 +102,7 @@ def load_tests(
     if not of_base:
         contents.findings[:] = _not_pushed(contents.findings, of_logs)
     contents.findings += [*of_logs, *_driven_together(contents)]
+    contents.findings += [*_too_short(tests), *contradictions(contents.logs, tests.description)]
     return tests
 
 
@@ -110,6 +116,31 @@ def _wrong_priors(folder: Folder) -> list[str]:
             reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
             lines.append(key_line(f"priors.{key} = 0", reason))
     return lines_on(folder.path / ROV_FILE, lines)
+
+
+def _too_short(tests: Tests) -> Iterator[Finding]:
+    """Yield a finding where all that moves the vehicle are short dives, without two pushes each way along any axis."""
+    logs, layout = [log for log in tests.folder.logs if log.commands], tests.layout
+    if not logs or any(log.follows_axis for log in logs) or {*tests.axes} != {*tests.logged}:
+        return
+    rows = [log.commands.rows for log in logs if log.commands]
+    commands = [log.commands.in_rows for log in logs if log.commands]
+    seconds = sum(float(np.ptp(times)) for times in rows)
+
+    def pushes(axis: Axis, sign: float) -> int:
+        along = (sign * push_along(layout, axis, values) > _PUSH for values in commands)
+        return sum(_holds(times, on) for times, on in zip(rows, along, strict=True))
+
+    axes = [axis for axis in layout.bare_axes if axis.name in tests.logged]
+    if seconds < _SHORT and all(min(pushes(axis, sign) for sign in (1.0, -1.0)) < _PUSHES for axis in axes):
+        yield Finding("too short", words={"seconds": f"{seconds:.0f}"})
+
+
+def _holds(times: Array, on: Flags) -> int:
+    """Return how often something is on for at least a second."""
+    edges = np.diff(np.concatenate([[0], on, [0]]))
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
+    return int(np.sum(times[ends] - times[begins] >= _HOLD))
 
 
 def _without_force(folder: Folder) -> Iterator[str]:
@@ -210,6 +241,7 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         thrust_errors=_thrust_errors(tests, curves),
         unseen=unseen,
         has_times=bool(tests.folder.astern("time_constant")),
+        turned=(tests.description.tables.logs.reversed, tests.description.tables.logs.mounted),
     )
     return known, logs, [row for row, _, counts in table_rows(tests, layout) if counts]
 

@@ -41,7 +41,7 @@ from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import ROV_FILE
-from rov_fmu.tank.findings import MISFITS
+from rov_fmu.tank.findings import MISFITS, REFUSED, sentences
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -63,6 +63,8 @@ def identify(tests: Tests, on_progress: Progress = silent, on_answer: OnAnswer |
 
 
 def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -> Identification:
+    if lines := sentences(finding for finding in tests.folder.findings if finding.kind in REFUSED):
+        raise DataFileError(*(f"{tests.folder.path}: {line}" for line in lines))
     on_progress("reading the logs", 0.0)
     known, logs, rows = begin(tests)
     if not (known.fitted or known.curves):

@@ -12,6 +12,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.tank.description import Draft
+from rov_fmu.tank.findings import REFUSED, sentences
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.tank.readers.parsers import one_parser
 
@@ -72,10 +73,12 @@ def _tried(paths: Sequence[Path], inspected: Inspected, *, drafts: bool) -> Insp
     try:
         as_written = Draft(inspected.completed.content.decode(), "") if drafts else None
         draft = as_written if inspected.own else inspected.draft_for(None)
-        load_tests(folder, files=files, draft=draft)
+        found = load_tests(folder, files=files, draft=draft).folder.findings
     except FileError as error:
         lines = str(error).splitlines()
         reasons = {warning: warning.rpartition("left out as unreadable: ")[2] for warning in inspected.warnings}
         others = [one for one, reason in reasons.items() if not any(line.endswith(reason) for line in lines)]
         return replace(inspected, warnings=[*others, *lines], is_refused=True)
-    return inspected
+    told = [finding for finding in found if finding.kind in (*REFUSED, "doubtful signs")]
+    is_refused = any(finding.kind in REFUSED for finding in told)
+    return replace(inspected, warnings=[*inspected.warnings, *sentences(told)], is_refused=is_refused)

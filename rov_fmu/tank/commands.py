@@ -74,7 +74,9 @@ class LogKeys(Strict):
     """True where the commands are forces and moments on the body, although the vehicle has thrusters."""
     reversed: Annotated[tuple[str, ...], AS_TUPLE] = ()
     """The thrusters that push against their directions at a positive command, whatever the parameters of an autopilot
-    tell, by name."""
+    tell, by name: their wires are swapped. They push astern by the curve ahead, and ahead by that astern."""
+    mounted: Annotated[tuple[str, ...], AS_TUPLE] = ()
+    """The thrusters that are mounted the other way, by name: their directions are opposite to those of the vehicle."""
 
     def signs(self, thrusters: Sequence[str]) -> Array:
         """Return -1 for each thruster that is reversed, and 1 for the others."""

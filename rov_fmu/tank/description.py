@@ -447,6 +447,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         start = replace(start, coupled=file.body.coupling)
     if base and file.geometry:
         start = file.geometry.placed(start)
+    start = replace(start, thrusters=tuple(t.opposite if t.name in file.logs.mounted else t for t in start.thrusters))
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys)
@@ -526,10 +527,7 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     if "known" not in lost:
         yield from _missing_halves(file, description)
     yield from _doubled_thrust(file, description)
-    names = [thruster.name for thruster in layout.thrusters]
-    for name in file.logs.reversed:
-        if name not in names:
-            yield key_line("logs.reversed", f"there is no such thruster{only(name, names)}", name)
+    yield from _mistakes_in_logs(file.logs, layout)
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.by_name]
     for name in file.windows:
         if name not in windows:
@@ -544,6 +542,18 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
                 yield key_line(f"fit.{key}", f"{given} is given, so it cannot be fitted too", name)
     if requests.attitude and (own := [name for name in ("roll", "pitch") if name in description.axes]):
         yield key_line("fit.attitude", f"the vehicle has the axis {join_names(own)}, which is simulated: leave it out")
+
+
+def _mistakes_in_logs(keys: LogKeys, layout: Layout) -> Iterator[str]:
+    """Yield a line for each name in [logs] that is no thruster's, or that of one without a direction to turn round."""
+    names = [thruster.name for thruster in layout.thrusters]
+    fixed = names if layout.has_wrench else [thruster.name for thruster in layout.thrusters if thruster.arm]
+    for key, some in (("reversed", keys.reversed), ("mounted", keys.mounted)):
+        for name in some:
+            if name not in names:
+                yield key_line(f"logs.{key}", f"there is no such thruster{only(name, names)}", name)
+            elif key == "mounted" and name in fixed:
+                yield key_line("logs.mounted", "has an arm, or is a force on the body: name it in reversed", name)
 
 
 _UNKNOWN_EFFECTS = {

@@ -35,6 +35,9 @@ def about(file: str, kind: str, axis: str = "", /, **words: str | float) -> Find
 MISFITS = ("motors without thruster", "thrusters without pulse")
 """The kinds of findings about logs whose motors are not the thrusters of the vehicle."""
 
+REFUSED = ("signs", "too short")
+"""The kinds of findings about logs that are not worth a fit."""
+
 _WARNINGS = {
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
     "tank tests": "{files}: read as tables of tank tests",
@@ -69,6 +72,14 @@ _WARNINGS = {
     "clock restarts": "{files}: the clock restarts or jumps after {at} s. The log is read as two, before and after",
     "unlikely rate": (
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
+    ),
+    **dict.fromkeys(
+        ("signs", "doubtful signs"),
+        "{files}: the log contradicts {what} by {errors:.0f} standard errors: {why}",
+    ),
+    "too short": (
+        "the dives take {seconds} s, and nothing is pushed twice each way for a second: that determines nothing. Fly "
+        "longer, for two minutes or more, with weak and strong commands of both signs along each axis"
     ),
     "perhaps at rest": (
         "{files}: the outputs hardly rest at 1500 us, which is taken as no thrust, and most stay at {rest} us. If that "

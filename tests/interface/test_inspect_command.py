@@ -319,10 +319,11 @@ def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path:
     one_file(folder)
     draft = folder / "rov.toml"
     assert main(["inspect", str(folder)]) == 0
-    printed = capsys.readouterr().out
+    printed, warned = capsys.readouterr()
     assert not draft.exists()
     assert "thruster 1" in printed
-    assert printed.endswith(f"Next: rov-fmu identify '{folder}'\n")
+    assert "nothing is pushed twice each way" in warned
+    assert printed.endswith(f"Next: correct this, then rov-fmu identify '{folder}'\n")
     lines = printed.partition("--draft writes them:\n")[2].splitlines()
     assert main(["inspect", str(folder), "--draft"]) == 0
     text = draft.read_text(encoding="utf-8")

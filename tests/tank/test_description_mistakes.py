@@ -171,6 +171,17 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: logs.reversed = 'w': there is no such thruster, only v",
     ),
     (
+        f'{DOWN}[logs]\nmounted = ["w"]\n',
+        WITH_THRUST,
+        "/rov.toml: logs.mounted = 'w': there is no such thruster, only v",
+    ),
+    (
+        f'base = "videoray"\n{HEAD}[logs]\nmounted = ["l"]\n',
+        {},
+        "/rov.toml: logs.mounted = 'l': has an arm, or is a force on the body: name it in reversed"
+        " | /rov.toml: thruster.l.arm: must be of a thruster that pushes ahead; give its position instead",
+    ),
+    (
         DOWN,
         {"thrust_t200.csv": pulled(30.0, 20.0), "time_constant_heave.csv": f"{TAU}\n0.3,2\n"},
         ": no steady_heave*.csv or log of heave that counts, and [known] in rov.toml does not give a_d_w, b_d_w",

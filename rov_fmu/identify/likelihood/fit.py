@@ -50,6 +50,9 @@ _UNREFINED = 2
 _PATIENCE = 2e6
 """After so many fits times samples and parameters, no more causes are tried for a model that is wrong along all axes:
 half a minute on a usual machine."""
+_LOST = 100.0
+"""No cause is tried where the errors over 10 s are so many times the noise along all axes: 660 and 1900 in a log whose
+commands say nothing about its motion."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -187,10 +190,12 @@ def _searched_for_structure(
 
     def searched(plain: StructureFit, before: StructureSearch | None = None) -> StructureSearch:
         size = len(plain.minimum.z) * sum(len(one.innovations) for one in plain.minimum.data)
-        search = StructureSearch(plain, lambda: show_tried(next(tried)), _PATIENCE / size)
+        is_lost = min((one.ratio for one in plain.misfits.values()), default=0.0) > _LOST
+        search = StructureSearch(plain, lambda: show_tried(next(tried)), 0.0 if is_lost else _PATIENCE / size)
         if before:
             search.begin_with(before)
-        search.run()
+        if not is_lost:
+            search.run()
         return search
 
     search = searched(start) if start.is_hopeless and not is_mistake else StructureSearch(start)

@@ -133,6 +133,15 @@ def _of_layout(changed: Callable[[Layout, Of], Layout]) -> Change:
     return change
 
 
+def _turned_round(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
+    """Return the model in which some thrusters work astern where they worked ahead, and push to the same side."""
+
+    def opposite(layout: Layout, of: Of) -> Layout:
+        return replace(layout, thrusters=tuple(t.opposite if t.name in of else t for t in layout.thrusters))
+
+    return _of_layout(opposite)(*_permuted(lambda of: (of, -1.0))(known, logs, of, start), of, start)
+
+
 def _with_rotors(layout: Layout, _: Of) -> Layout:
     return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
 
@@ -249,6 +258,12 @@ def _ill(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that may have lost force. A commanded force along an axis of the body is not one of them."""
     if not known.layout.has_wrench:
         yield from _thrusters(known, logs)
+
+
+def _turned(known: Prior, _: Logs) -> Iterator[Of]:
+    """Yield the thrusters that rov.toml says to be reversed, and those mounted the other way."""
+    free = {thruster.name for thruster in known.layout.thrusters if not (thruster.arm or known.layout.has_wrench)}
+    yield from (of for of in known.turned if of and free.issuperset(of))
 
 
 def _sharing(known: Prior, logs: Logs) -> Iterator[Of]:
@@ -373,6 +388,16 @@ HYPOTHESES = {
         sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
         is_contrast=True,
         # no null: two commands are swapped or not, and nothing lies between
+    ),
+    "turned round": Hypothesis(
+        0.05,
+        _turned,
+        _turned_round,
+        sentence=(
+            "thrusters {of}: they work astern where rov.toml says ahead{odds}. In [logs], name them under mounted in "
+            "place of reversed, or under reversed in place of mounted"
+        ),
+        # no null: a propeller works ahead or astern, and nothing lies between
     ),
     "rotor lag": Hypothesis(
         0.07,

@@ -40,6 +40,8 @@ class Prior:
     freed: frozenset[tuple[str, str]] = frozenset()
     """The rows of hypotheses about the structure that a fit may change, by their kind and what has them. The others
     stay where they change nothing."""
+    turned: Sequence[tuple[str, ...]] = ()
+    """The thrusters that rov.toml says to be reversed, and those that it says to be mounted the other way."""
     own_curves: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """The curves of single thrusters: the curve that each was before, and the thruster. The thrust astern and the dead
     bands differ, and all else is shared."""

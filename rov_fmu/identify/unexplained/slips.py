@@ -52,6 +52,7 @@ from rov_fmu.identify.likelihood.solve import (
 from rov_fmu.identify.result import KEPT, Slip
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.inspection.signs import FRAME
 from rov_fmu.tank.log import Channel
 
 _CERTAIN, _WEIGHED = 2.0, 0.05
@@ -277,7 +278,7 @@ def _frames(compared: Sequence[_Match]) -> Iterator[Scaling]:
 def _frame_in_words(frame: Scaling) -> tuple[str, str]:
     """Return what the frame of some channels is called, and a mistake in it as a question."""
     sources = {match.channel.source for match, _ in frame}
-    question = "do up and down, and port and starboard, have the other meaning (north-east-down is not east-north-up)"
+    question = f"do {FRAME}"
     return f"frame of {sources.pop()}" if len(sources) == 1 else "frame", question
 
 

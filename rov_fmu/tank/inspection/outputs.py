@@ -103,7 +103,7 @@ def moved(logs: Sequence[Log]) -> Moved:
     effects: dict[str, dict[Axis, float]] = {name: {} for name in outputs}
     logs, shown = _without_rests(logs, [*effects]), []
     for axis in GUESSED:
-        if fit := _fit(logs, axis, [*effects]):
+        if fit := regression(logs, axis, [*effects]):
             shown.append(axis)
             for name, by in fit.clear(effects):
                 effects[name][axis] = by
@@ -121,16 +121,16 @@ def _without_rests(logs: Sequence[Log], outputs: Sequence[str]) -> Sequence[Log]
     layouts = (Layout((heave,), (), (thruster,)) for thruster in vertical)
     tried = ([piece for log in logs for piece in without_rests(log, layout)] for layout in layouts)
     possible = [[*logs], *(pieces for pieces in tried if pieces != [*logs])]
-    return max(possible, key=lambda own: fit.most if (fit := _fit(own, HEAVE, outputs)) else 0.0)
+    return max(possible, key=lambda own: fit.most if (fit := regression(own, HEAVE, outputs)) else 0.0)
 
 
-def _fit(logs: Sequence[Log], axis: Axis, outputs: Sequence[str]) -> "_Fit | None":
+def regression(logs: Sequence[Log], axis: Axis, outputs: Sequence[str]) -> "Effects | None":
     """Return the clearest regression for an axis, or None where no log shows it."""
     fits = (fit for span in _SPANS for fit in _fits(logs, axis, outputs, span))
     return max(fits, key=lambda fit: fit.most, default=None)
 
 
-def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) -> Iterator["_Fit"]:
+def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) -> Iterator["Effects"]:
     """Yield the regression for each quantity that shows an axis."""
     for is_rate in (True, False):
         rows = [
@@ -142,7 +142,7 @@ def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) 
         ]
         if sum(len(left) for left, _ in rows) >= _LEAST_WINDOWS:
             left, right = (np.concatenate(side) for side in zip(*rows, strict=True))
-            yield _Fit.of(left, right, len(outputs), len(left) * _STEP / span)
+            yield Effects.of(left, right, len(outputs), len(left) * _STEP / span)
 
 
 def _windows(log: Log, channel: Channel, outputs: Sequence[str], span: float) -> Iterator[tuple[Array, Array]]:
@@ -171,16 +171,40 @@ def _windows(log: Log, channel: Channel, outputs: Sequence[str], span: float) ->
     is_rate = channel.quantity.is_velocity
     rate = np.interp(points, time, values) @ w if is_rate else -(seen @ slope)
     nothing = np.zeros(len(begins))
-    sides = [*(own.get(name, nothing) for name in outputs), rate, np.full(len(begins), w.sum())]
+    coupled = _coupling(log, channel.quantity.axis, points) @ w
+    speed = np.interp(points, time, values) if is_rate else np.gradient(seen, span / (_POINTS - 1), axis=1)
+    drag = (np.abs(speed) * speed) @ w
+    sides = [*(own.get(name, nothing) for name in outputs), rate, drag, coupled, np.full(len(begins), w.sum())]
     yield -(seen @ slope) if is_rate else seen @ bend, np.column_stack(sides)
 
 
+def _coupling(log: Log, axis: Axis | None, at: Array) -> Array:
+    """Return what couples an axis to two others: for a velocity over ground, the turn rate times the velocity across,
+    and for yaw, the product of the velocities (the Munk moment). It is 0 where no log shows it."""
+    names = {SURGE: ("heading", "sway velocity"), SWAY: ("heading", "surge velocity")}
+    others = names.get(axis, ("surge velocity", "sway velocity") if axis is YAW else ()) if axis else ()
+    product = np.ones(at.shape)
+    for channel in map(log.used, others or ("",)):
+        time, values = channel.unwrapped if channel else (np.zeros(2), np.zeros(2))
+        is_rate = channel and channel.quantity.is_velocity
+        product *= np.interp(at, time, values if is_rate or not channel else np.gradient(values, time))
+    return product
+
+
 @dataclass(frozen=True)
-class _Fit:
-    """The effects of outputs by a regression, and how clear each is: relative to its standard error."""
+class Effects:
+    """The effects of outputs along an axis by a regression."""
 
     effects: Array
+    """n: the acceleration that the full command of each output causes, m/s² or rad/s²."""
     clearness: Array
+    """n: their sizes relative to their standard errors."""
+    left: Array
+    """The left side of the equation in each window."""
+    right: Array
+    """windows x (n + 2): the push of each output at full effect, the rate, and a constant."""
+    independent: float
+    """How many of the windows are independent, because the others overlap with them."""
 
     @property
     def most(self) -> float:
@@ -188,7 +212,7 @@ class _Fit:
         return float(self.clearness.max(initial=0.0))
 
     @classmethod
-    def of(cls, left: Array, right: Array, outputs: int, independent: float) -> "_Fit":
+    def of(cls, left: Array, right: Array, outputs: int, independent: float) -> "Effects":
         """Fit n windows, of which so many are independent, because the others overlap with them.
 
         Outputs that always get the same command share their effect: combinations of commands that hardly occur have
@@ -206,7 +230,18 @@ class _Fit:
         back = occurring @ inverse[: occurring.shape[1]]
         deviation = np.sqrt(of_row * np.sum(back**2, axis=1))
         found = back @ left
-        return cls(found / scale[:outputs], np.abs(found) / np.maximum(deviation, np.finfo(float).tiny))
+        clearness = np.abs(found) / np.maximum(deviation, np.finfo(float).tiny)
+        return cls(found / scale[:outputs], clearness, left, right, independent)
+
+    def unexplained(self, effects: Array) -> float:
+        """Return the sum of the squared errors where the outputs have effects of these ratios and signs, n."""
+        outputs = len(effects)
+        sides = np.column_stack([self.right[:, :outputs] @ effects, self.right[:, outputs:]])
+        found = np.linalg.lstsq(sides, self.left)[0]
+        if found[0] < 0.0:  # the push would act backwards
+            sides = sides[:, 1:]
+            found = np.linalg.lstsq(sides, self.left)[0]
+        return float(np.sum((self.left - sides @ found) ** 2))
 
     def clear(self, outputs: Iterable[str]) -> Iterator[tuple[str, float]]:
         """Yield the outputs that clearly move the axis, with the accelerations."""

@@ -159,7 +159,7 @@ def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
     )
 
 
-def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
+def dive(vehicle: str | Vehicle, fault: Fault, rng: np.random.Generator) -> str:
     """A log of steps of all thrusters, each at its own levels, with the noise of sensors."""
     whole = without_surface(rov_fmu.load(vehicle))
     names = [t.name for t in whole.layout.thrusters]
