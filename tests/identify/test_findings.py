@@ -221,6 +221,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
     (
+        "turned round",
+        quiet(structures=(Structure("turned round", "5 and 6", 0.97),)),
+        "thrusters 5 and 6: they work astern where rov.toml says ahead",
+        quiet(),
+    ),
+    (
         "idle commands",
         quiet(structures=(Structure("idle commands", "a.csv (6.0 to 80.0 s)", 1.0),)),
         "a.csv (6.0 to 80.0 s): the commands do not act before and after, as if the thrusters were off",

@@ -7,7 +7,7 @@ way and a depth of the other sign, are told together.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -49,22 +49,23 @@ def _contradiction(file: str, logs: Sequence[Log], description: Description) -> 
     is_deep = bool(depths) and float(np.median(np.concatenate(depths))) > _DEEP
     sure = {HEAVE} if is_deep else set[Axis]()
     expected = np.array([pushes[axis] for axis in fits])
-    steps, explained = list[str](), 0.0
+    steps, turned, explained = list[str](), set[str](), 0.0
     for _ in range(_STEPS if fits else 0):
-        tried = [*_mistakes(expected, names, [*fits], sure, description.tables.logs)]
-        gains = [_gain([*fits.values()], expected, changed) for changed, _ in tried]
+        tried = [*_mistakes(expected, names, [*fits], sure)]
+        gains = [_gain([*fits.values()], expected, changed) for changed, _, _ in tried]
         if (most := max(gains)) < _DOUBTFUL**2:
             break
-        alike = [words for gain, (_, words) in zip(gains, tried, strict=True) if gain > most - _DOUBTFUL**2]
-        expected, _ = tried[gains.index(most)]
-        explained += most
-        if not all(alike):  # the fit finds the angle of a sensor
+        alike = [one for gain, one in zip(gains, tried, strict=True) if gain > most - _DOUBTFUL**2]
+        if not all(words for _, words, _ in alike):  # the fit finds the angle of a sensor
             return
-        steps.append(", or ".join(alike[:_MOST]))
+        expected, explained = tried[gains.index(most)][0], explained + most
+        steps.append(", or ".join(words for _, words, _ in alike[:_MOST]))
+        turned ^= {*alike[0][2]}
     if steps:
         errors, what = explained**0.5, f"the assumed {description.base_name}" if description.assumed else "rov.toml"
         kind = "signs" if errors >= _CERTAIN else "doubtful signs"
-        yield about(file, kind, what=what, errors=errors, why="; and ".join(steps))
+        why = "; and ".join(steps) + (_in_logs(turned, names, description.tables.logs) if turned else "")
+        yield about(file, kind, what=what, errors=errors, why=why)
 
 
 def _gain(fits: Sequence[Effects], expected: Array, changed: Array) -> float:
@@ -77,10 +78,10 @@ def _gain(fits: Sequence[Effects], expected: Array, changed: Array) -> float:
 
 
 def _mistakes(
-    expected: Array, names: Sequence[str], axes: Sequence[Axis], sure: Iterable[Axis], keys: LogKeys
-) -> Iterator[tuple[Array, str]]:
-    """Yield the effects (axes x thrusters) that each mistake gives, and what is told about it; nothing of a velocity
-    sensor that is turned.
+    expected: Array, names: Sequence[str], axes: Sequence[Axis], sure: Iterable[Axis]
+) -> Iterator[tuple[Array, str, Sequence[str]]]:
+    """Yield the effects (axes x thrusters) that each mistake gives, what is told about it, and which thrusters push the
+    other way. Nothing is told of a velocity sensor that is turned.
 
     The sensors along the axes that are `sure` have the right sign.
     """
@@ -88,31 +89,36 @@ def _mistakes(
     for some in dict.fromkeys([*((n,) for n in range(len(names))), *combinations(range(len(names)), 2), *groups]):
         changed = expected.copy()
         changed[:, some] *= -1.0
-        yield changed, _turned_round([names[n] for n in some], names, keys)
+        turned = [names[n] for n in some]
+        yield changed, f"the push of {listed(turned)} has the other sign", turned
     own = [axis for axis in axes if axis not in sure]
-    for turned in dict.fromkeys([*((axis,) for axis in own), tuple(axis for axis in own if axis is not SURGE)]):
-        signs = np.array([-1.0 if axis in turned else 1.0 for axis in axes])
-        positive = listed(f"{axis.name} ({axis.positive} is positive)" for axis in turned)
-        yield signs[:, None] * expected, f"{positive}: {FRAME if len(turned) > 1 else 'the sensor has the other sign'}"
-    for one, other in combinations(range(len(names)), 2):
+    for other in dict.fromkeys([*((axis,) for axis in own), tuple(axis for axis in own if axis is not SURGE)]):
+        signs = np.array([-1.0 if axis in other else 1.0 for axis in axes])
+        positive = listed(f"{axis.name} ({axis.positive} is positive)" for axis in other)
+        yield (
+            signs[:, None] * expected,
+            f"{positive}: {FRAME if len(other) > 1 else 'the sensor has the other sign'}",
+            (),
+        )
+    for pair in map(list, combinations(range(len(names)), 2)):
         changed = expected.copy()
-        changed[:, [one, other]] = expected[:, [other, one]]
-        yield changed, f"the commands of {names[one]} and {names[other]} are exchanged"
+        changed[:, pair] = expected[:, pair[::-1]]
+        yield changed, f"the commands of {listed(names[n] for n in pair)} are exchanged", ()
     if {SURGE, SWAY} <= {*axes}:
         both = [axes.index(SURGE), axes.index(SWAY)]
         for angle in np.radians([45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0]):
             changed, (c, s) = expected.copy(), (np.cos(angle), np.sin(angle))
             changed[both] = np.array([[c, s], [-s, c]]) @ expected[both]
-            yield changed, ""
+            yield changed, "", ()
 
 
-def _turned_round(some: Sequence[str], names: Sequence[str], keys: LogKeys) -> str:
+def _in_logs(turned: Collection[str], names: Sequence[str], keys: LogKeys) -> str:
     """Return what to write where some thrusters push the other way."""
     wires, mounted = (
-        json.dumps([name for name in names if (name in some) != (name in given)])
+        json.dumps([name for name in names if (name in turned) != (name in given)])
         for given in (keys.reversed, keys.mounted)
     )
     return (
-        f"the push of {listed(some)} has the other sign: write reversed = {wires} into [logs] of rov.toml if wires are "
-        f"swapped, so that they push astern in place of ahead, or mounted = {mounted} if they are mounted the other way"
+        f". Write reversed = {wires} into [logs] of rov.toml if wires are swapped, so that they push astern in place "
+        f"of ahead, or mounted = {mounted} if they are mounted the other way"
     )

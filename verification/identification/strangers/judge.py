@@ -133,11 +133,13 @@ class _Said:
 
 
 def _said(folder: Path) -> _Said:
-    begin = process_time()
+    begin, contradicted = process_time(), tuple[str, ...]()
     try:
-        result = identify(load_tests(folder))
+        tests = load_tests(folder)
+        contradicted = tuple(f"signs {f.words['why']}" for f in tests.folder.findings if f.kind == "signs")
+        result = identify(tests)
     except FileError as error:
-        return _Said(seconds=process_time() - begin, error=str(error))
+        return _Said(causes=contradicted, seconds=process_time() - begin, error=str(error))
     except Exception as error:  # a crash is judged like a refusal, so that the other folders are still run
         return _Said(seconds=process_time() - begin, error=f"{type(error).__name__}: {error}")
     return _Said(

@@ -358,7 +358,7 @@ FAULTS = (
         "reversed, no table",
         "starboard is reversed, and nobody measured the thrust",
         wired=_reversed,
-        causes=r"reversed commands .*stbd",
+        causes=r"(signs|reversed).*stbd.*",
         has_table=False,
         group="law",
     ),
@@ -370,8 +370,8 @@ FAULTS = (
         group="law",
     ),
     Kind("rotor lag", "the lag is on the rotors' speed", _rotors, causes="rotor lag", group="law"),
-    Kind("reversed", "starboard is reversed", wired=_reversed, causes=r"reversed commands .*stbd", group="law"),
-    Kind("swapped", "port and starboard are swapped", wired=_swapped, causes=r"swapped commands .*", group="law"),
+    Kind("reversed", "starboard is reversed", wired=_reversed, causes=r"(signs|reversed).*stbd.*", group="law"),
+    Kind("swapped", "port and starboard are swapped", wired=_swapped, causes=r"(signs|swapped) .*", group="law"),
     Kind(
         "limit", "commands end at 45 %", followed=lambda c: np.clip(c, -0.45, 0.45), causes="command limit", group="law"
     ),
