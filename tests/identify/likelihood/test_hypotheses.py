@@ -23,7 +23,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import optional_effects
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.fit import Fit, _searched_for_structure
 from rov_fmu.identify.likelihood.hypotheses import (
     CONTRAST,
     HYPOTHESES,
@@ -67,6 +67,7 @@ from rov_fmu.identify.likelihood.search import (
     worst,
 )
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, start_of
+from rov_fmu.identify.progress import ProgressReport
 from rov_fmu.identify.result import ALARM, USUAL
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank import log as tank_log
@@ -991,6 +992,27 @@ def test_a_fit_that_will_not_be_good_enough_is_given_up(
         counts.append(len(steps))
         assert (found is None) == (enough > 0.0)
     assert 2 * counts[0] < counts[1]
+
+
+@pytest.mark.parametrize(("ratio", "searches"), [(99.0, True), (101.0, False)])
+def test_no_cause_is_tried_where_the_errors_are_far_beyond_any(
+    ratio: float, searches: bool, reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Along all axes. The search has ended then, which is told, and nothing is refined."""
+    misfits = {SURGE: Misfit(ratio), YAW: Misfit(300.0)}
+    monkeypatch.setattr(StructureFit, "misfits", property(lambda _: misfits))
+    begun = list[StructureSearch]()
+
+    def run(self: StructureSearch) -> None:
+        begun.append(self)
+
+    monkeypatch.setattr(StructureSearch, "run", run)
+    quick = applied(reversed_model, {}, thinned=True)
+    end = minimise(quick, start_of(quick), most=1)
+    start = StructureFit({}, quick, end, 0.0, 0.0)
+    search, _ = _searched_for_structure(start, reversed_model, ProgressReport(), is_mistake=False)
+    assert bool(begun) == searches
+    assert search.has_ended == (not searches)
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, OWN])])
