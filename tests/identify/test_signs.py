@@ -16,7 +16,7 @@ from rov_fmu.identify.likelihood.search import comparison, rough
 from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import HEAD, folder_of
-from tests.identify.likelihood.test_hypotheses import Fault, dive
+from tests.identify.likelihood.test_hypotheses import TURNS, Fault, dive
 
 UPWARDS = ["5 [1]", "6 [1]"]
 VEHICLES = {name: dive(name, Fault(""), np.random.default_rng(3)) for name in ("bluerov2", "videoray")}
@@ -73,9 +73,10 @@ def test_nothing_is_said_about_a_right_log(vehicle: str, tmp_path: Path) -> None
     assert not told(folder_of(tmp_path, ROV.format(vehicle), {"dive.csv": VEHICLES[vehicle]}))
 
 
-def test_a_turned_velocity_sensor_is_left_to_the_fit(tmp_path: Path) -> None:
+@pytest.mark.parametrize("turned", TURNS)
+def test_a_turned_velocity_sensor_is_left_to_the_fit(turned: float, tmp_path: Path) -> None:
     """It finds the angle, and turns the values back."""
-    log = dive("bluerov2", Fault("", turned=np.radians(135.0)), np.random.default_rng(4))
+    log = dive("bluerov2", Fault("", turned=np.radians(turned)), np.random.default_rng(4))
     assert not told(folder_of(tmp_path, ROV.format("bluerov2"), {"dive.csv": log}))
 
 

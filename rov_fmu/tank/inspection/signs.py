@@ -26,8 +26,8 @@ _DOUBTFUL, _CERTAIN = 5.0, 10.0
 """A contradiction is told from so many standard errors on, and no fit is made from so many on."""
 _STEPS, _MOST = 2, 3
 """So many mistakes may come together, and so many that explain the same are told."""
-_DEEP = 0.5
-"""The depth has the right sign if its median is larger, m."""
+_DEEP = 2.0
+"""The depth has the right sign if its median is larger, m: few logs count it from where they begin."""
 FRAME = "up and down, and port and starboard, have the other meaning (north-east-down is not east-north-up)"
 """What is wrong where a frame forward, to starboard, down is read as one forward, to port, up, or the other way."""
 
