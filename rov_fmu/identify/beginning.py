@@ -119,7 +119,10 @@ def _wrong_priors(folder: Folder) -> list[str]:
 
 
 def _too_short(tests: Tests) -> Iterator[Finding]:
-    """Yield a finding where all that moves the vehicle are short dives, without two pushes each way along any axis."""
+    """Yield a finding where all that moves the vehicle are short dives, without two pushes each way along any axis.
+
+    A free decay is pushed by no thruster, and tells the drag in a short time.
+    """
     logs, layout = [log for log in tests.folder.logs if log.commands], tests.layout
     if not logs or any(log.follows_axis for log in logs) or {*tests.axes} != {*tests.logged}:
         return
@@ -132,7 +135,8 @@ def _too_short(tests: Tests) -> Iterator[Finding]:
         return sum(_holds(times, on) for times, on in zip(rows, along, strict=True))
 
     axes = [axis for axis in layout.bare_axes if axis.name in tests.logged]
-    if seconds < _SHORT and all(min(pushes(axis, sign) for sign in (1.0, -1.0)) < _PUSHES for axis in axes):
+    counts = [[pushes(axis, sign) for sign in (1.0, -1.0)] for axis in axes]
+    if seconds < _SHORT and np.any(counts) and all(min(ways) < _PUSHES for ways in counts):
         yield Finding("too short", words={"seconds": f"{seconds:.0f}"})
 
 
