@@ -26,7 +26,7 @@ from rov_fmu.io.reading import read_bytes
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
-VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{1,4}}([-/.])[0-9]{{1,2}}\\3[0-9]{{2,4}}.*|[0-9]+:[0-9]{{2}}.*")
+VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{1,4}}([-/.])[0-9]{{1,2}}\3[0-9]{{2,4}}.*|[0-9]+:[0-9]{{2}}.*")
 """A cell of a row: a number, a date or a time of day."""
 QUOTED_NUMBER = re.compile(r'" *([+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?) *"')
 """A number with a comma in quotes."""
@@ -43,6 +43,8 @@ MOST_BEFORE = 100
 """The number of lines in which the header is looked for."""
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
+_LOOKS = {"NMEA": re.compile(r"[$!][A-Z0-9]{5,}[,*]"), "JSON": re.compile(r'\s*(\{|\[[\s0-9"{\[-])')}
+"""How lines begin that have no header, by what they look like."""
 EMPTY = "the file is empty"
 """What is wrong with a file without content."""
 NO_ROWS = "no rows below the header"
@@ -84,9 +86,6 @@ def read_series(
     """
     file = CsvFile(path, open_stream)
     line, header = next(iter(file))
-    if all(NUMBER.fullmatch(name) for name in header):
-        words = ": the time, and then variables" if has_time else ""
-        raise DataFileError(f"{path}: the first line must be a header that names the columns{words}")
     wrong = Mistakes(path)
     for index, name in enumerate(header):
         if reason := _why_no_variable(header, index, why_wrong, is_time=has_time and not index):
@@ -254,6 +253,24 @@ def _dialect(lines: Iterable[str]) -> _Dialect:
     return first or _Dialect()
 
 
+def _looks_like(dialect: _Dialect, lines: Iterable[str]) -> str:
+    """Return what the lines of a table without a header look like; an empty text for those that begin with a header.
+
+    The first of them is a row if its cells are numbers where those of the second one are.
+    """
+    first, second, *_ = [*islice(filter(str.strip, islice(lines, dialect.before, None)), 2), "", ""]
+    if dialect.has_rows:
+        return ""
+    if found := next((kind for kind, begins in _LOOKS.items() if begins.match(first)), ""):
+        return found
+    rows = (
+        [(VALUE.fullmatch(cell) is not None, is_missing(cell)) for cell in cells]
+        for cells in (dialect.titles, _cells(second, dialect.separator) or dialect.titles)
+    )
+    both = [(one, other) for (one, a), (other, b) in zip(*rows, strict=False) if not (a or b)]
+    return "numbers" if (True, True) in both and all(one == other for one, other in both) else ""
+
+
 def _cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without empty ones at its end."""
     cells = []
@@ -333,6 +350,7 @@ class CsvFile:
         self.path = path
         self._open = open_stream or open_text(Path(path))
         self._dialect = _dialect(self._open())
+        self._looks_like = _looks_like(self._dialect, self._open())
         self._has_decimal_commas = self._dialect.separator != "," or _has_decimal_commas(self._open())
         self._indices: Indices = {}
         self.left_out = 0
@@ -376,6 +394,8 @@ class CsvFile:
             for row in reader:
                 cells = [_with_point(cell.strip()) if self._has_decimal_commas else cell.strip() for cell in row]
                 if any(cells):
+                    if is_header and self._looks_like:
+                        raise self._no_header(cells)
                     if is_header and self._dialect.has_rows:
                         cells[0] = cells[0].lstrip(_COMMENT).strip() or cells[0]
                     is_header = False
@@ -384,6 +404,11 @@ class CsvFile:
             raise DataFileError(f"{self.path}, line {before + reader.line_num}: not CSV: {error}") from error
         if is_header:
             raise UnreadableFileError(f"{self.path}: {EMPTY}")
+
+    def _no_header(self, cells: Iterable[str]) -> DataFileError:
+        where = f"{self.path}, line {self._dialect.before + 1} = {shown(', '.join(cells))}"
+        needs = "a table needs a line above them that names the columns"
+        return DataFileError(f"{where}: no header; these lines look like {self._looks_like}, and {needs}")
 
     def align(self, grown: FindGrown) -> bool:
         """Find the columns of the header in rows that have more cells from some line on. Return True if they are."""

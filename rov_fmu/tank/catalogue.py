@@ -225,7 +225,17 @@ _OF_BLUEYE = (
     ),
     Message(_ESTIMATE, ("position_estimate.heading",), "heading"),
 )
-MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS, *_OF_BLUEYE)
+COCKPIT = "PVRND"
+DVL_VELOCITY, DVL_PLACE, DVL_ANGLES = (f"waterlinked {name}" for name in ("velocity", "position", "attitude"))
+"""The kinds of messages of VideoRay Cockpit, and of the DVL A50 of Water Linked."""
+_OF_LINES = (
+    Message(COCKPIT, ("depth",), "depth"),
+    Message(COCKPIT, ("roll", "pitch", "heading"), EULER, "deg", NED),
+    Message(DVL_VELOCITY, ("vx", "vy", "vz"), VELOCITY, frame=FRD),
+    Message(DVL_PLACE, ("x", "y", "z"), POSITION, frame=NED),
+    Message(DVL_ANGLES, ("roll", "pitch", "yaw"), EULER, "deg", NED),
+)
+MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS, *_OF_BLUEYE, *_OF_LINES)
 """What the messages of all formats measure. Of two sources of a quantity, that of the earlier entry is preferred."""
 
 

@@ -150,6 +150,7 @@ _FACTS = {
     "rows without numbers": "{files}: {count:#row} with a time and no number left out",
     "rows before commands": "{files}: {count:#row} before the first command left out",
     "torn rows": "{files}: {count:#row} with a wrong number of cells left out",
+    "broken lines": "{files}: {count:#line} left out, which are cut or have a wrong checksum",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "leave out": "{files}: {axes} left out, as [leave_out] in rov.toml says",
     "invalid": "{files}: {count:#value} of {columns} left out, because {what} says that they are invalid",

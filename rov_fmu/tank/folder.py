@@ -18,18 +18,24 @@ import hashlib
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import inf
 from pathlib import Path
+
+import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
 from rov_fmu.io.file_kinds import OWN_SUFFIXES, TESTS, check_suffix
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.channels import with_one_source
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, ColumnNames, columns_of, has_column, names_of
 from rov_fmu.tank.description import (
     NO_ROV_FILE,
@@ -63,6 +69,7 @@ _LACKING = {
     "leave_out": "there is no such log",
 }
 """What is wrong with a name in a table of rov.toml that no file has."""
+_DAY = 86400.0
 _LOADS = "The vehicle has these loads as inputs, and neither thrusters nor their lag"
 _OWN_THRUSTERS = f"The vehicle has the thrusters of {ROV_FILE} as inputs, whose thrust and lag these logs do not tell"
 
@@ -416,7 +423,8 @@ def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = Fa
 def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ()) -> Log:
     """Return the log of a dive of several files, of which one has the commands. Raises DataFileError.
 
-    If the times of a file do not overlap with those of the commands, its first sample is moved to the first command.
+    If the times of a file, or of files that the same sensors wrote one after the other, do not overlap with those of
+    the commands, the first sample is moved to the first command.
     """
     commanding = [log for log in logs if log.commands]
     if len(commanding) != 1:
@@ -426,28 +434,76 @@ def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ())
         )
     commands = commanding[0].commands
     assert commands
-    parts = [log if log.commands else _on_clock(log, commands, is_other=log.file in other_clock) for log in logs]
+    parts = []
+    for group in _by_sensor(logs):
+        log, is_other = _one_after_another(group), any(one.file in other_clock for one in group)
+        parts.append(log if log.commands else _on_clock(log, commands, is_other=is_other))
+    channels = (replace(channel, file=log.file) for log in parts for channel in log.channels)
     return replace(
         commanding[0],
         start=min(log.begin for log in parts),
-        channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
+        channels=tuple(with_one_source([*channels])),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
         unread={name: what for log in parts for name, what in log.unread.items()},
     )
 
 
-def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
-    """Return a file of a dive on the clock of the commands, with a finding if it has another clock."""
+def _by_sensor(logs: Sequence[Log]) -> Iterable[Sequence[Log]]:
+    """Return the logs in groups: files without commands of the same channels, if each begins after the end of the one
+    before it, are of the same sensors and have the same clock."""
+    by_channels = grouped(
+        ((log.commands and log.file, frozenset((c.quantity.name, c.source) for c in log.channels)), log) for log in logs
+    )
+    for group in by_channels.values():
+        ordered = sorted(group, key=lambda log: _ends(log)[0])
+        follows = all(_ends(one)[1] < _ends(other)[0] for one, other in pairwise(ordered))
+        yield from [ordered] if follows else ([log] for log in group)
+
+
+def _ends(log: Log) -> tuple[float, float]:
+    """Return the first and the last time of what a log measures, s; the first is later if it measures nothing."""
     times = [channel.samples[0] for channel in log.channels if channel.count]
-    if not times:
+    return min((time[0] for time in times), default=inf), max((time[-1] for time in times), default=-inf)
+
+
+def _one_after_another(logs: Sequence[Log]) -> Log:
+    """Return the log of files of the same channels, one after the other."""
+    if len(logs) == 1:
+        return logs[0]
+    of = grouped(((c.quantity.name, c.source, c.derived_from), c) for log in logs for c in log.channels)
+    return replace(
+        logs[0],
+        file=join_names(log.file for log in logs),
+        channels=tuple(
+            replace(
+                own[0],
+                time=np.concatenate([one.time for one in own]),
+                values=np.concatenate([one.values for one in own]),
+            )
+            for own in of.values()
+        ),
+        findings=tuple(finding for log in logs for finding in log.findings),
+        names=frozenset().union(*(log.names for log in logs)),
+        unread={name: what for log in logs for name, what in log.unread.items()},
+    )
+
+
+def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
+    """Return a file of a dive on the clock of the commands, with a finding if it has another clock.
+
+    Of two clocks of the same time of day, one may tell no date.
+    """
+    start, end = _ends(log)
+    if start > end:
         return log
-    start, end = min(time[0] for time in times), max(time[-1] for time in times)
-    overlap = start <= commands.rows[-1] and commands.rows[0] <= end
-    if overlap and not is_other:
+    first, last = commands.rows[0], commands.rows[-1]
+    possible = (0.0, _DAY * round((first - start) / _DAY))
+    overlap = next((by for by in possible if start + by <= last and first <= end + by), None)
+    if overlap == 0.0 and not is_other:
         return log
-    moved = 0.0 if overlap else float(commands.rows[0] - start)
-    kind = "other clock" if overlap else "aligned clock"
+    moved = float(first - start) if overlap is None else overlap
+    kind = "aligned clock" if overlap is None else "other clock"
     return replace(
         log,
         start=log.begin + moved,

@@ -68,7 +68,7 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
         ("time [s]\n1\n", r"line 1: 'length \[m\]' is missing$"),
         (
             "0,1\n",
-            r"line 1 = '0, 1': the first line must be a header that names the columns, such as length \[m\], time",
+            "line 1 = '0, 1': no header; these lines look like numbers, and a table needs a line above them that names",
         ),
         ("", "the file is empty"),
     ],
@@ -233,7 +233,8 @@ def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_pa
 # ---- Variables over time ---------------------------------------------------------------------------------------------
 
 SERIES = {
-    "0,1\n1,2\n": ": the first line must be a header that names the columns: the time, and then variables",
+    "0,1\n1,2\n": ", line 1 = '0, 1': no header; these lines look like numbers, and a table needs a line above them "
+    "that names the columns",
     "time,u [%]\n0,1\n": ", line 1, column 'u [%]': must be 'u' without a unit; a command of 30 % is 0.3 here",
     "time [ms],u\n0,1\n": ", line 1, column 'time [ms]': must be the time in s, which is the unit here",
     "time,u,u\n0,1,1\n": ", line 1, column 'u': this column occurs twice",

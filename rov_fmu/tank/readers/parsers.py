@@ -29,6 +29,7 @@ from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import read_bag, read_database, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
+from rov_fmu.tank.readers.lines import read_videoray, read_waterlinked
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
 from rov_fmu.tank.readers.other_files import reason_against
 from rov_fmu.tank.readers.recordings import ZSTD
@@ -73,6 +74,9 @@ FORMATS = (
     # µs since 1970, most significant byte first, and then the first byte of a MAVLink message
     Format("a telemetry log", rb"(?s)\0.{7}[\xfe\xfd]", read=read_telemetry, needs=_PYMAVLINK),
     Format("a DataFlash log in text", rb"(?m)[^\0]*?^FMT, ?\d", read=read_dataflash_text, needs=_PYMAVLINK),
+    # without a bracket before it, in which a header above it would have a unit
+    Format("an export of VideoRay Cockpit", rb"[^\0\[]*?\$PVRND,", read=read_videoray, growth=3),
+    Format("a log of Water Linked's DVL", rb'[^\0]*?"(vx|position_local)" ?[:,}]', read=read_waterlinked, growth=3),
     TABLE,
 )
 """All formats, and the only table of them."""

@@ -4,6 +4,7 @@ import json
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,44 @@ def matlab(folder: Path, dive: Dive) -> Path:
     pulses = {name.removeprefix("pwm."): own.pop(name) for name in VARIABLES if name.startswith("pwm.")}
     savemat(folder / "dive.mat", {**own, "pwm": pulses})
     return folder / "dive.mat"
+
+
+def cockpit_lines(dive: Dive) -> list[str]:
+    """Return the sentences that VideoRay Cockpit exports, with the checksums of NMEA, but with more digits."""
+    lines = []
+    for time, depth, (roll, pitch, yaw) in zip(dive.time, dive.position[:, 2], np.degrees(dive.euler), strict=True):
+        date = datetime(2026, 9, 14, 10, 8, 2) + timedelta(seconds=float(time))
+        cells = f"PVRND,{date:%m/%d/%Y,%H:%M:%S.%f},{depth:.6f},{yaw % 360.0:.5f},{pitch:.5f},{roll:.5f}"
+        checksum = 0
+        for byte in cells.encode():
+            checksum ^= byte
+        lines.append(f"${cells}*{checksum:02X}")
+    return lines
+
+
+def cockpit(folder: Path, dive: Dive) -> Path:
+    (folder / "vr.txt").write_text("\r\n".join([*cockpit_lines(dive), ""]), encoding="utf-8", newline="")
+    return folder / "vr.txt"
+
+
+def dvl_reports(dive: Dive, *, is_dated: bool = True) -> list[dict[str, Any]]:
+    """Return the reports of a DVL A50: a velocity, and a position by dead reckoning, of each row."""
+    reports: list[dict[str, Any]] = []
+    for time, (vx, vy, vz), place, angles in zip(
+        dive.time, dive.velocity, dive.position, np.degrees(dive.euler), strict=True
+    ):
+        velocity = {"time": 100.0, "vx": vx, "vy": vy, "vz": vz, "fom": 0.001, "altitude": 1.2, "velocity_valid": True}
+        dated = {"time_of_validity": round(1e6 * (BOOT + time))} if is_dated else {}
+        reports.append({**velocity, **dated, "transducers": [{"id": 0}], "type": "velocity", "format": "json_v3.1"})
+        moved = dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*place, *angles), strict=True))
+        reports.append({"ts": BOOT + time, **moved, "std": 0.01, "type": "position_local", "status": 0})
+    return reports
+
+
+def dvl(folder: Path, dive: Dive) -> Path:
+    lines = "".join(f"{json.dumps(report)}\n" for report in dvl_reports(dive))
+    (folder / "dvl.json").write_text(lines, encoding="utf-8")
+    return folder / "dvl.json"
 
 
 # ---- MAVLink ---------------------------------------------------------------------------------------------------------
@@ -513,6 +552,8 @@ SEEDS: Mapping[str, Callable[[Path, Dive], Path]] = {
     "an MCAP file": bag(".mcap"),
     "a file that zstd compressed": packed_bag,
     "a .mat file": matlab,
+    "an export of VideoRay Cockpit": cockpit,
+    "a log of Water Linked's DVL": dvl,
     "a CSV file": csv,
 }
 """A writer for every format, by its name in rov_fmu/tank/readers/parsers.py."""
