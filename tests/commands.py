@@ -70,6 +70,7 @@ WRITING = {
     ("simulate", "plot"): Command("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
     ("fly", "output"): Command("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
     ("sitl", "log"): Command("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
+    ("sitl", "parameters"): Command("rov.parm", "sitl bluerov2 --port 0 --duration 0.01 --parameters {f}/rov.parm"),
     ("export", "output"): Command("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
     ("export", "folder"): Command("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
     ("system", "output"): Command("my.ssp", f"system {_SYSTEM} -o {{f}}/my.ssp"),

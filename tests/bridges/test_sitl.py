@@ -581,16 +581,8 @@ def test_the_parameters_of_ardusub_are_written_as_the_simulator_loads_them(
 
 
 def test_a_dead_time_may_be_set_where_the_file_has_none() -> None:
-    setup, _ = _setup(
-        SHIPPED["bluerov2"],
-        frame=None,
-        servos=(),
-        settings=["T_d=0.02", "z=2"],
-        bottom=20.0,
-        log=None,
-        log_rate=10.0,
-        force=False,
-    )
+    options: dict[str, Any] = {"frame": None, "servos": (), "bottom": 20.0, "log": None, "log_rate": 10.0}
+    setup, _ = _setup(SHIPPED["bluerov2"], settings=["T_d=0.02", "z=2"], force=False, **options)
     assert (setup.vehicle["T_d"], setup.start) == (0.02, {"z": 2.0})
     late, now = (Stepper(rov, {}, ["F_1"]) for rov in (setup.vehicle, load_vehicle(SHIPPED["bluerov2"])))
     commands = [0.5] * 6

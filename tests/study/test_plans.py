@@ -138,7 +138,7 @@ SAMPLES = {
     "alpha_u,m_rov\n1.0,6.5\n1.2,6.6\n": "",
     "": "design.csv: the file is empty",
     "alpha_u,alpha_u\n1.0,1.1\n": "design.csv, line 1, column 'alpha_u': this column occurs twice",
-    "1.0,1.1\n1.0,1.1\n": "design.csv: the first line must be a header that names the columns",
+    "1.0,1.1\n1.0,1.1\n": "design.csv, line 1 = '1.0, 1.1': no header; these lines look like numbers",
     "alpha_u\n": "design.csv: no rows below the header",
     "alpha_u\nnan\n": "design.csv, line 2, column 'alpha_u' = 'nan': must be a finite number",
     "alpha_u\n1.0\n-1.0\n": "plan.toml: samples: alpha_u = -1.0: must be within 0 ... 1000",

@@ -181,7 +181,7 @@ def test_the_feed_forward_makes_a_speed_follow() -> None:
 
 # ---- The same flight everywhere --------------------------------------------------------------------------------------
 
-AIMS = {"depth": 11.0, "heading": 1.0, "surge": 0.3}
+AIMS: dict[str, Any] = {"depth": 11.0, "heading": 1.0, "surge": 0.3}
 STEPS = 400
 
 
