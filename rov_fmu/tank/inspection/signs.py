@@ -26,8 +26,8 @@ _DOUBTFUL, _CERTAIN = 5.0, 10.0
 """A contradiction is told from so many standard errors on, and no fit is made from so many on."""
 _STEPS, _MOST = 2, 3
 """So many mistakes may come together, and so many that explain the same are told."""
-_DEEP = 2.0
-"""The depth has the right sign if its median is larger, m: few logs count it from where they begin."""
+_HIGH, _DEEP = -1.0, 5.0
+"""The depth has the right sign if it is never above the first number, m, and once beyond the second."""
 FRAME = "up and down, and port and starboard, have the other meaning (north-east-down is not east-north-up)"
 """What is wrong where a frame forward, to starboard, down is read as one forward, to port, up, or the other way."""
 
@@ -46,8 +46,8 @@ def _contradiction(file: str, logs: Sequence[Log], description: Description) -> 
     pushes = {axis: np.array([thrusters[name].effect(axis) for name in names]) for axis in GUESSED}
     fits = {axis: fit for axis in GUESSED if pushes[axis].any() and (fit := regression(logs, axis, names))}
     depths = [channel.samples[1] for log in logs if (channel := log.used(HEAVE.position))]
-    is_deep = bool(depths) and float(np.median(np.concatenate(depths))) > _DEEP
-    sure = {HEAVE} if is_deep else set[Axis]()
+    high, deep = np.quantile(np.concatenate(depths), (0.01, 0.99)) if depths else (0.0, 0.0)
+    sure = {HEAVE} if high > _HIGH and deep > _DEEP else set[Axis]()
     expected = np.array([pushes[axis] for axis in fits])
     steps, turned, explained = list[str](), set[str](), 0.0
     for _ in range(_STEPS if fits else 0):
