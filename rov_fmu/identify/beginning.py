@@ -50,9 +50,9 @@ _NEVER_EXACT = ("white_noise", "coloured_noise")
 """The priors whose deviation must not be 0."""
 _MOST_REASONS = 3
 """The most reasons in a line that refuses a log."""
-_SHORT, _PUSHES, _PUSH, _HOLD = 30.0, 2, 0.04, 0.9
-"""Dives that take less than the first number, s, tell nothing if no axis is pushed so often each way, by such a part of
-full command for such a time, s: good logs take 49 s or more."""
+_SHORT, _PUSH, _HOLD = 30.0, 0.04, 0.9
+"""Dives that take less than the first number, s, tell nothing if no axis is pushed both ways, by such a part of full
+command for such a time, s."""
 _UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
 _QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
@@ -119,7 +119,7 @@ def _wrong_priors(folder: Folder) -> list[str]:
 
 
 def _too_short(tests: Tests) -> Iterator[Finding]:
-    """Yield a finding where all that moves the vehicle are short dives, without two pushes each way along any axis.
+    """Yield a finding where all that moves the vehicle are short dives, without a push both ways along any axis.
 
     A free decay is pushed by no thruster, and tells the drag in a short time.
     """
@@ -136,7 +136,7 @@ def _too_short(tests: Tests) -> Iterator[Finding]:
 
     axes = [axis for axis in layout.bare_axes if axis.name in tests.logged]
     counts = [[pushes(axis, sign) for sign in (1.0, -1.0)] for axis in axes]
-    if seconds < _SHORT and np.any(counts) and all(min(ways) < _PUSHES for ways in counts):
+    if seconds < _SHORT and np.any(counts) and not any(map(all, counts)):
         yield Finding("too short", words={"seconds": f"{seconds:.0f}"})
 
 

@@ -28,6 +28,8 @@ _WITHOUT_POSITION = 45.0
 """The time after which ArduSub knows its position, s."""
 _FAR = 0.1
 """A rise that matters, m."""
+_PARAMETERS = (".parm", ".param")
+"""How the name of a file of ArduPilot's parameters ends."""
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
 
@@ -38,6 +40,8 @@ def serve(path: Path, *, host: str, port: int, duration: float | None, parameter
     `parameters` is a file of parameters to write for ArduSub. `flight` has the other options, which `_setup` describes.
     Raises FileError, InputError about an option, WriteError about a file, and BuildError.
     """
+    if parameters and parameters.suffix not in _PARAMETERS:
+        raise InputError(f"--parameters {parameters}: the name must end with {' or '.join(_PARAMETERS)}")
     setup, frame = _setup(path, **flight)
     if parameters:
         needed = _parameters(frame, rolls_alone=_rolls_alone(setup))

@@ -78,7 +78,7 @@ _WARNINGS = {
         "{files}: the log contradicts {what} by {errors:.0f} standard errors: {why}",
     ),
     "too short": (
-        "the dives take {seconds} s, and nothing is pushed twice each way for a second: that determines nothing. Fly "
+        "the dives take {seconds} s, and nothing is pushed both ways for a second: that determines nothing. Fly "
         "longer, for two minutes or more, with weak and strong commands of both signs along each axis"
     ),
     "perhaps at rest": (

@@ -105,10 +105,10 @@ def test_neither_inspect_nor_identify_goes_on(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_a_short_log_without_pushes_both_ways_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Also by `inspect`, in the same words; with two pushes each way it is tried."""
+    """Also by `inspect`, in the same words; with a push both ways it is tried."""
     rows = VEHICLES["videoray"].splitlines()
-    short = folder_of(tmp_path, ROV.format("videoray"), {"dive.csv": "\n".join(rows[:80])})
-    words = "nothing is pushed twice each way for a second"
+    short = folder_of(tmp_path, ROV.format("videoray"), {"dive.csv": "\n".join(rows[:40])})
+    words = "nothing is pushed both ways for a second"
     assert main(["inspect", str(short)]) == 0
     assert words in capsys.readouterr().err
     assert main(["identify", str(short)]) == 2

@@ -322,7 +322,7 @@ def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path:
     printed, warned = capsys.readouterr()
     assert not draft.exists()
     assert "thruster 1" in printed
-    assert "nothing is pushed twice each way" in warned
+    assert "nothing is pushed both ways" in warned
     assert printed.endswith(f"Next: correct this, then rov-fmu identify '{folder}'\n")
     lines = printed.partition("--draft writes them:\n")[2].splitlines()
     assert main(["inspect", str(folder), "--draft"]) == 0
