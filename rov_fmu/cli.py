@@ -764,6 +764,8 @@ def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, forc
     inspected, files = inspect_tests(tests, report, drafts=drafts, force=force)
     print_inspected(inspected, with_draft=not drafts)
     print_end(files, ", then ".join(next_steps(inspected, tests, drafts=drafts)))
+    if not (drafts or any(one.commands or one.channels for one in inspected.logs)):
+        raise FileError(f"{tests[0]}: nothing that is recognised as a log or a table of tests")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.inspection.inspected import Inspected, inspect_paths
 from rov_fmu.interface.arguments import checked_paths
 from rov_fmu.io.file_kinds import PAGE
-from rov_fmu.io.messages import FileError
+from rov_fmu.io.messages import FileError, listed
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.tank.description import Draft
@@ -60,9 +60,11 @@ def inspect_tests(
 
 def next_steps(inspected: Inspected, paths: Sequence[Path], *, drafts: bool) -> list[str]:
     """Return what to do next, in words or as command lines. With `drafts`, the draft of rov.toml is written."""
-    if not (drafts or inspected.is_enough):
-        return [shell_words("rov-fmu", "inspect", *paths, "--draft")]
     is_new = drafts and bool(inspected.text) and not inspected.own
+    if not drafts and not (inspected.is_enough and (inspected.own or not inspected.unknown)):
+        return [shell_words("rov-fmu", "inspect", *paths, "--draft")]
+    if inspected.unknown and not is_new:
+        return [*inspected.missing, f"write into {inspected.path} what these headers mean: {listed(inspected.unknown)}"]
     return ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *paths)]
 
 

@@ -55,8 +55,9 @@ _HINTS = {
     FMU: "`rov-fmu prove` runs its experiments, and a plan names it as `fmu`",
     TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
     _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
-    _TABLE: "to see a recording beside a vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
-    _LOG: "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it",
+    **dict.fromkeys(
+        (_TABLE, _LOG), "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it"
+    ),
 }
 
 

@@ -105,8 +105,8 @@ def _drawn(row: Signal) -> str:
 
 
 def _gaps(row: Signal) -> Iterator[str]:
-    """Yield the first gaps of a signal, with times from its first sample."""
-    for start, end in row.gaps[:_MOST_GAPS]:
-        yield f"{end - start:.3g} s at {start - row.start:.4g} s"
+    """Yield the first gaps of a signal."""
+    for long, start in row.gaps[:_MOST_GAPS]:
+        yield f"{long:.3g} s at {start:.4g} s"
     if (more := len(row.gaps) - _MOST_GAPS) > 0:
         yield f"{more} more"

@@ -35,6 +35,11 @@ LEAST_PRESSURE = 0.01
 """The least share of an atmosphere that a barometer under water shows; less is in another unit."""
 
 
+_EARTH = "north", "east", "down", "up"
+EARTH = NORTH, EAST, DOWN, UP = tuple(f"{to} velocity" for to in _EARTH)
+"""Velocities in directions of the earth, which the attitude turns into those of the body."""
+
+
 @dataclass(frozen=True)
 class MeasuredQuantity:
     """A quantity that a sensor measures."""
@@ -73,6 +78,10 @@ def _quantities() -> Iterator[MeasuredQuantity]:
         rates = {f"{unit}/s": per for unit, per in lengths.items()} | others
         also = axis.velocity, f"{axis.name} {word}"
         yield MeasuredQuantity(f"{axis.name} velocity", rates, axis, True, also, minimum=-1e3, maximum=1e3)
+    speeds = {f"{unit}/s": per for unit, per in LENGTHS.items()} | _SPEEDS
+    for to in _EARTH:
+        also = (f"velocity {to}", f"velocity_{to}")
+        yield MeasuredQuantity(f"{to} velocity", speeds, None, True, also, minimum=-1e3, maximum=1e3)
     yield MeasuredQuantity("distance", LENGTHS)
     yield MeasuredQuantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
     yield MeasuredQuantity(
@@ -376,7 +385,7 @@ def is_known_kind(kind: str) -> bool:
 
 
 FLAGS = (
-    (r"\b(dvl|velocity|velocities|vel|speed|twist|bottom|lock)\b", VECTORS[VELOCITY]),
+    (r"\b(dvl|velocity|velocities|vel|speed|twist|bottom|lock)\b", (*VECTORS[VELOCITY], *EARTH)),
     (r"\b(depth|pressure|baro|barometer)\b", ("depth", "pressure")),
     (r"\b(heading|compass|magnetometer|yaw)\b", ("heading",)),
     (r"\b(attitude|ahrs|orientation|imu)\b", VECTORS[EULER]),
@@ -404,6 +413,7 @@ HEADERS = (
     ("roll velocity", f"roll|{_ANGULAR} x"),
     ("pitch velocity", f"pitch|{_ANGULAR} y"),
     ("yaw velocity", f"yaw|turn|heading|{_ANGULAR} z"),
+    *((f"{to} velocity", f"{to} (velocity|vel|speed)|v ?{to[0]}|{_LINEAR} {to[0]}({to[1:]})?") for to in _EARTH),
     ("surge velocity", f"surge|forward|ahead|v x|{_LINEAR} x"),
     ("sway velocity", f"sway|side|sideways|lateral|v y|{_LINEAR} y"),
     ("heave velocity", f"heave|vertical|v z|{_LINEAR} z"),

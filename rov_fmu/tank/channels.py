@@ -23,17 +23,22 @@ from scipy.spatial.transform import Rotation, Slerp
 from rov_fmu.tank.arrays import Array, Flags, rms, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
+    DOWN,
+    EARTH,
+    EAST,
     EULER,
     HULL,
     LEAST_PRESSURE,
     MESSAGES,
     NED,
+    NORTH,
     NOT_MEASURED,
     POSITION,
     PRESSURE_GRADIENT,
     QUANTITIES,
     QUATERNION,
     RATES,
+    UP,
     VECTORS,
     VELOCITY,
     MeasuredQuantity,
@@ -60,6 +65,8 @@ _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global"
 """Words in the names of frames that are fixed to the earth."""
 
 
+_NO_HEADING = "no heading beside velocities north and east turns them into those of the body"
+"""Why velocities in directions of the earth are left out."""
 _WATERS = 0.9, 1.1
 """The range of specific gravities of water in which vehicles dive."""
 Gravity = Callable[[Array], Array]
@@ -153,7 +160,7 @@ def channels_of(
     channels = [*named]
     for one in measurements:
         channels += _channels(one, one.unused or _contradiction(one, measurements), attitude, gravity)
-    return with_one_source(channels)
+    return with_one_source(in_body_frame(with_one_source(channels)))
 
 
 def _measurements(topics: Sequence[Topic], sender: Source | None, others: Collection[str]) -> Iterator[_Measurement]:
@@ -286,6 +293,42 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
 def _at(attitude: Slerp, time: Array) -> Rotation:
     """Return the attitude at some times; before and after all that are known, the first and the last one."""
     return attitude(np.clip(time, *attitude.times[[0, -1]]))
+
+
+def in_body_frame(channels: Sequence[Channel]) -> list[Channel]:
+    """Return the channels with velocities of the body in place of those north, east, and down or up.
+
+    Without a roll and a pitch, or without a vertical velocity, the vehicle is taken as level, as it is for a vertical
+    one alone. Without a heading, which may be in another file of the dive, those north and east are left out.
+    """
+    may_be_used = (c for c in reversed(channels) if c.count and c.unused in ("", _NO_HEADING))
+    found = {channel.quantity.name: channel for channel in may_be_used}
+    if found.keys().isdisjoint(EARTH):
+        return [*channels]
+    north, east, down, heading = map(found.get, (NORTH, EAST, DOWN, "heading"))
+    if up := found.get(UP):
+        down = down or replace(up, values=-up.values)
+    others = [c for c in channels if c.quantity.name not in EARTH]
+    if down and not (north or east):
+        return [replace(down, quantity=QUANTITIES["heave velocity"]), *others]
+    if not (north and east and heading):
+        return [replace(c, unused=c.unused or _NO_HEADING) if c.quantity.name in EARTH else c for c in channels]
+    time, tilt = north.time, [found.get(name) for name in ("pitch angle", "roll angle")]
+    known = [heading, *(tilt if down and all(tilt) else [None, None])]
+    angles = [np.interp(time, *one.unwrapped) if one else np.zeros(len(time)) for one in known]
+    vector = [_interpolated(one, time) if one else np.zeros(len(time)) for one in (north, east, down)]
+    turn = Rotation.from_euler("ZYX", np.column_stack(angles)).inv()
+    moved = zip(VECTORS[VELOCITY][: 3 if down else 2], turn.apply(np.column_stack(vector)).T, strict=False)
+    source = Source("velocities north and east, which the heading turns", kind="earth")
+    return [
+        *(replace(north, quantity=QUANTITIES[of], source=source, values=own, unused="") for of, own in moved),
+        *others,
+    ]
+
+
+def _interpolated(channel: Channel, time: Array) -> Array:
+    """Return the values of a channel at some times, s; NaN at its own times without a measurement."""
+    return channel.values if np.array_equal(channel.time, time) else np.interp(time, *channel.samples)
 
 
 # ---- Channels --------------------------------------------------------------------------------------------------------

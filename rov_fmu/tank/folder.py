@@ -35,7 +35,7 @@ from rov_fmu.io.reading import open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.channels import with_one_source
+from rov_fmu.tank.channels import in_body_frame, with_one_source
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, ColumnNames, columns_of, has_column, names_of
 from rov_fmu.tank.description import (
     NO_ROV_FILE,
@@ -48,7 +48,7 @@ from rov_fmu.tank.description import (
     read_rov_file,
 )
 from rov_fmu.tank.findings import Finding, about, sentences
-from rov_fmu.tank.log import Commands, Log
+from rov_fmu.tank.log import Channel, Commands, Log
 from rov_fmu.tank.quality import checked_log, uninterrupted
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.listing import NOT_OPENED, Listing, has_usual_suffix, is_bag, list_files
@@ -434,28 +434,30 @@ def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ())
         )
     commands = commanding[0].commands
     assert commands
-    parts = []
+    parts, channels = list[Log](), list[Channel]()
     for group in _by_sensor(logs):
-        log, is_other = _one_after_another(group), any(one.file in other_clock for one in group)
-        parts.append(log if log.commands else _on_clock(log, commands, is_other=is_other))
-    channels = (replace(channel, file=log.file) for log in parts for channel in log.channels)
+        is_other = any(log.file in other_clock for log in group)
+        moved = group if group[0].commands else _on_clock(group, commands, is_other=is_other)
+        parts += moved
+        own = grouped(
+            ((c.quantity.name, c.source, c.derived_from), (log.file, c)) for log in moved for c in log.channels
+        )
+        channels += [_one_after_another(pairs) for pairs in own.values()]
     return replace(
         commanding[0],
         start=min(log.begin for log in parts),
-        channels=tuple(with_one_source([*channels])),
+        channels=tuple(with_one_source(in_body_frame(channels))),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
         unread={name: what for log in parts for name, what in log.unread.items()},
     )
 
 
-def _by_sensor(logs: Sequence[Log]) -> Iterable[Sequence[Log]]:
-    """Return the logs in groups: files without commands of the same channels, if each begins after the end of the one
+def _by_sensor(logs: Sequence[Log]) -> Iterator[Sequence[Log]]:
+    """Yield the logs in groups: files without commands of the same channels, if each begins after the end of the one
     before it, are of the same sensors and have the same clock."""
-    by_channels = grouped(
-        ((log.commands and log.file, frozenset((c.quantity.name, c.source) for c in log.channels)), log) for log in logs
-    )
-    for group in by_channels.values():
+    kinds = ((log.commands and log.file, frozenset((c.quantity.name, c.source) for c in log.channels)) for log in logs)
+    for group in grouped(zip(kinds, logs, strict=True)).values():
         ordered = sorted(group, key=lambda log: _ends(log)[0])
         follows = all(_ends(one)[1] < _ends(other)[0] for one, other in pairwise(ordered))
         yield from [ordered] if follows else ([log] for log in group)
@@ -467,49 +469,43 @@ def _ends(log: Log) -> tuple[float, float]:
     return min((time[0] for time in times), default=inf), max((time[-1] for time in times), default=-inf)
 
 
-def _one_after_another(logs: Sequence[Log]) -> Log:
-    """Return the log of files of the same channels, one after the other."""
-    if len(logs) == 1:
-        return logs[0]
-    of = grouped(((c.quantity.name, c.source, c.derived_from), c) for log in logs for c in log.channels)
+def _one_after_another(pairs: Sequence[tuple[str, Channel]]) -> Channel:
+    """Return the channel of one quantity of one sensor, whose samples are in several files, each with its name."""
+    files, parts = zip(*pairs, strict=True)
+    times, values = ([getattr(part, name) for part in parts] for name in ("time", "values"))
     return replace(
-        logs[0],
-        file=join_names(log.file for log in logs),
-        channels=tuple(
-            replace(
-                own[0],
-                time=np.concatenate([one.time for one in own]),
-                values=np.concatenate([one.values for one in own]),
-            )
-            for own in of.values()
-        ),
-        findings=tuple(finding for log in logs for finding in log.findings),
-        names=frozenset().union(*(log.names for log in logs)),
-        unread={name: what for log in logs for name, what in log.unread.items()},
+        parts[0],
+        file=join_names(dict.fromkeys(files)),
+        time=np.concatenate(times) if parts[1:] else times[0],  # columns of a file share their times
+        values=np.concatenate(values),
     )
 
 
-def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
-    """Return a file of a dive on the clock of the commands, with a finding if it has another clock.
+def _on_clock(logs: Sequence[Log], commands: Commands, *, is_other: bool) -> Sequence[Log]:
+    """Return files of a dive that share a clock on that of the commands, with a finding if it is another one.
 
     Of two clocks of the same time of day, one may tell no date.
     """
-    start, end = _ends(log)
+    starts, ends = zip(*map(_ends, logs), strict=True)
+    start, end = min(starts), max(ends)
     if start > end:
-        return log
+        return logs
     first, last = commands.rows[0], commands.rows[-1]
     possible = (0.0, _DAY * round((first - start) / _DAY))
     overlap = next((by for by in possible if start + by <= last and first <= end + by), None)
     if overlap == 0.0 and not is_other:
-        return log
+        return logs
     moved = float(first - start) if overlap is None else overlap
     kind = "aligned clock" if overlap is None else "other clock"
-    return replace(
-        log,
-        start=log.begin + moved,
-        channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
-        findings=(*log.findings, about(log.file, kind)),
-    )
+    return [
+        replace(
+            log,
+            start=log.begin + moved,
+            channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
+            findings=(*log.findings, about(log.file, kind)),
+        )
+        for log in logs
+    ]
 
 
 def kind_of_table(path: Path, columns: Mapping[str, str]) -> str:

@@ -25,7 +25,7 @@ from tests.tank.inspection.test_outputs import dive, held
 from tests.tank.logs import commanded, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
-from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_tlog
+from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_mcap, write_tlog
 
 Capsys = pytest.CaptureFixture[str]
 Inspect = Callable[..., tuple[str, str]]
@@ -422,3 +422,99 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
         assert main([command, str(tmp_path)]) == 2
         (error,) = [line for line in capsys.readouterr().err.splitlines() if str(tmp_path / name) in line]
         assert error.startswith(f"rov-fmu: {tmp_path / name}")
+
+
+def test_a_draft_proposes_what_fields_of_unknown_messages_mean(tmp_path: Path, inspect: Inspect) -> None:
+    """With the proposals in force, commands, velocities in an earth frame and a depth are read of such messages."""
+    north, east, down = DIVE.over_ground.T
+    fields = {
+        "/thrusters": {f"pwm{n}": pulses for n, pulses in enumerate(DIVE.pulses.T, start=1)},
+        "/dvl": {"velocity_north": north, "velocity_east": east, "velocity_down": down, "velocity_valid": 0 * TIME + 1},
+        "/imu": {"yaw_deg": np.degrees(motion.HEADING), "roll_deg": np.degrees(motion.ROLL), "temperature": TIME},
+        "/attitude": {"pitch": np.degrees(motion.PITCH), "x": TIME, "w": TIME},
+    }
+    messages = [
+        (topic, f"own.{topic.strip('/').title()}", float(time), {name: float(own[n]) for name, own in of.items()})
+        for n, time in enumerate(TIME)
+        for topic, of in fields.items()
+    ]
+    write_mcap(tmp_path / "dive.mcap", "json", messages)
+    _, draft = inspect()
+    assert '# "/dvl.velocity_north" = "north velocity [m/s]"   # ' in draft
+    assert '# "/thrusters.pwm6" = "u_6 [us]"   # ' in draft
+    assert '# "/imu.yaw_deg" = "heading [deg]"   # ' in draft
+    for unknown in ("/imu.temperature", "/dvl.velocity_valid", "/attitude.x"):
+        assert f'# "{unknown}" = "?"' in draft
+    used_lines = re.sub(r'^# ("/[^"]+" = "[a-z-])', r"\1", draft.replace('base = "?"', 'base = "bluerov2"'), flags=re.M)
+    (tmp_path / "rov.toml").write_text(used_lines, encoding="utf-8")
+    weigh(tmp_path)
+    (log,) = load_tests(tmp_path).folder.logs
+    assert measured(log, "surge velocity") == pytest.approx(motion.U, abs=1e-5)
+    assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
+
+
+def with_gap(folder: Path, *titles: str) -> Path:
+    """Write a dive of 60 s whose DVL begins 12 s late and has a gap of 6 s from 24 s on."""
+    time: Array = np.arange(0.0, 60.0, 0.1)
+    push, columns = 0.3 * np.sign(np.sin(2.0 * time) + 0.2), ["l", "r", "t"]
+    blank = (time < 12.0) | ((time > 24.01) & (time < 29.99))
+    rows = [
+        f"{t:.1f},{c},{c},{c},{t:.2f}{f',{c}' * len(titles) if not b else ',' * len(titles)}"
+        for t, c, b in zip(time, push, blank, strict=True)
+    ]
+    header = ",".join(["time [s]", *(f"u_{name} [1]" for name in columns), "depth [m]", *titles])
+    (folder / "dive.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    return folder / "dive.csv"
+
+
+def test_gaps_and_courses_count_from_the_begin_of_the_log(tmp_path: Path, inspect: Inspect) -> None:
+    out, _ = inspect(with_gap(tmp_path, "surge velocity [m/s]"), "")
+    (line,) = (line for line in out.splitlines() if line.startswith("surge velocity"))
+    assert line.endswith("6 s at 24 s")
+    course = line[: -len("6 s at 24 s")].rstrip()[-32:]
+    assert [n for n, level in enumerate(course) if level == " "] == [*range(6), 13, 14, 15]
+    (depth,) = inspect_paths([tmp_path / "dive.csv"]).logs[0].channels[:1]
+    assert np.isfinite(depth.course).all()
+
+
+def test_identify_is_not_next_while_headers_that_it_needs_are_unknown(tmp_path: Path, inspect: Inspect) -> None:
+    log = with_gap(tmp_path, "dvl_fwd")
+    out, _ = inspect(log, "")
+    assert "no log has a velocity or a position of surge, unless dvl_fwd is one" in out
+    assert out.rstrip().endswith(f"Next: rov-fmu inspect {log} --draft")
+    draft = inspect(log)[1].replace('{ value = "?"', "{ value = 0.5")
+    (tmp_path / "rov.toml").write_text(draft, encoding="utf-8")
+    out, _ = inspect(log, "")
+    assert out.rstrip().endswith(f"Next: write into {tmp_path / 'rov.toml'} what these headers mean: dvl_fwd")
+    named = draft.replace('# "dvl_fwd" = "?"', '"dvl_fwd" = "surge velocity [m/s]"')
+    (tmp_path / "rov.toml").write_text(named, encoding="utf-8")
+    assert inspect(log, "")[0].rstrip().endswith(f"Next: rov-fmu identify {log}")
+
+
+def test_a_header_of_several_logs_is_named_once(tmp_path: Path, inspect: Inspect) -> None:
+    log = with_gap(tmp_path, "dvl_fwd", "dvl_stbd")
+    (tmp_path / "dive_2.csv").write_text(log.read_text(encoding="utf-8").replace("0.3", "0.2"), encoding="utf-8")
+    assert "unless dvl_fwd or dvl_stbd is one" in inspect(tmp_path, "")[0]
+
+
+def test_a_base_that_the_owner_removed_stays_removed(tmp_path: Path, inspect: Inspect) -> None:
+    one_file(tmp_path)
+    _, draft = inspect()
+    assert 'base = "bluerov2"' in draft
+    (tmp_path / "rov.toml").write_text(re.sub("(?m)^base = .*$", "", draft).partition("[known]")[0], encoding="utf-8")
+    _, again = inspect()
+    found = parsed(again)
+    assert "base" not in found
+    assert [thruster["name"] for thruster in found["thruster"]] == [*motion.THRUSTERS]
+    assert "body" in found
+
+
+def test_a_folder_without_a_log_ends_with_2(tmp_path: Path, capsys: Capsys) -> None:
+    table(tmp_path / "prices.csv", "name,price", TIME, TIME)
+    assert main(["inspect", str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert "Not enough is recognised" in out
+    assert err == f"rov-fmu: {tmp_path}: nothing that is recognised as a log or a table of tests\n"
+    (tmp_path / "prices.csv").rename(tmp_path / "dive.csv")
+    assert main(["list", str(tmp_path)]) == 0
+    assert "`rov-fmu inspect` lists what it contains" in " ".join(capsys.readouterr().out.split())

@@ -7,7 +7,7 @@ from pathlib import Path
 import tomlkit
 
 from rov_fmu.equation.catalogue import EXTERNAL
-from rov_fmu.identify.inspection.undetermined import undetermined
+from rov_fmu.identify.inspection.undetermined import possible_headers, undetermined
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output
@@ -66,6 +66,17 @@ class Inspected:
         has_names = all(finding.kind != "unnamed table" for one in self.logs for finding in one.findings)
         steps = {"add the commands, or name their columns": has_commands, "rename the tables": has_names}
         return [step for step, is_done in steps.items() if not is_done] or ["correct this"] * self.is_refused
+
+    @property
+    def unknown(self) -> list[str]:
+        """The first unknown headers that may measure the motion along an axis of which no log has any."""
+        logs = [log for one in self.logs if (log := one.log)]
+        shown = {
+            channel.quantity.axis for log in logs for channel in log.channels if channel.count and not channel.unused
+        }
+        axes = [axis for axis in self.description.layout.bare_axes if axis not in shown] if self.description else []
+        unread = [title for one in self.logs for title in one.unread]
+        return [*dict.fromkeys(title for axis in axes for title in possible_headers(axis, unread))]
 
     @property
     def is_enough(self) -> bool:
@@ -135,7 +146,8 @@ def inspect_paths(paths: Sequence[Path]) -> Inspected:
     headers = headers_of_tables(folder)
     likely = likely_vehicle(inspections, headers.curves)
     own = read_text(path, VehicleFileError).strip() if path.exists() else ""
-    if "thruster" in tomlkit.parse(own):
+    there = tomlkit.parse(own)
+    if "thruster" in there or ("vehicle" in there and "base" not in there):  # its owner removed the drafted base
         likely = replace(likely, base="")
     name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
     is_known = own or likely.base or not EXTERNAL.isdisjoint(likely.thrusters)

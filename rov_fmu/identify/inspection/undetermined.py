@@ -1,6 +1,6 @@
 """What recordings cannot determine, and why, told before any fit."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -115,9 +115,15 @@ def _reason(
     if unused:
         return f"{unused[0].quantity.name} from {unused[0].source} is left out ({unused[0].unused})", sensor
     what = "an angle or a rate" if axis.is_rotation else "a velocity or a position"
-    possible = [brief(title) for title in unread if may_be_velocity(title, is_rotation=axis.is_rotation)]
-    doubt = f", unless {listed(possible[:_MOST_NAMES], 'or')} is one" if possible else ""
+    possible = possible_headers(axis, unread)
+    doubt = f", unless {listed(possible, 'or')} is one" if possible else ""
     return f"no log has {what} of {{it}}{doubt}", sensor
+
+
+def possible_headers(axis: Axis, unread: Iterable[str]) -> list[str]:
+    """Return the first unknown headers that may be of a velocity along an axis, each once."""
+    possible = (brief(title) for title in unread if may_be_velocity(title, is_rotation=axis.is_rotation))
+    return [*dict.fromkeys(possible)][:_MOST_NAMES]
 
 
 def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[float, list[str]]:

@@ -1,8 +1,9 @@
 """A draft of rov.toml from what logs and tables contain, and what an incomplete rov.toml lacks of it."""
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import atan2, degrees, inf, isfinite
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from rov_fmu.io.messages import brief, first_of, listed, one_line
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.description import DRAFTED, vectored
-from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
+from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters, meant_by_field
 from rov_fmu.tank.inspection.inspection import Inspection
 from rov_fmu.tank.inspection.outputs import GUESSED, NOTHING_MOVED, RADIUS, Moved
 from rov_fmu.tank.readers.ardusub_frames import config_of, fitting_frames
@@ -75,6 +76,7 @@ def draft(
     some = vectored(vehicle.layout) if vehicle else []
     names = one_line(brief(", ".join(dict.fromkeys(one.path.name for one in inspections))))
     columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
+    fields = _fields(inspections)
     return render(
         "rov.toml.j2",
         Path(__file__).parent,
@@ -101,16 +103,18 @@ def draft(
         angle=degrees(atan2(*map(abs, some[0].direction.value[1::-1]))) if some else 0.0,
         columns=columns,
         headers=_questions(headers),
-        fields=_questions(_fields(inspections)),
+        fields=_questions(fields, partial(meant_by_field, fields=fields)),
         dives=[files for files in dives(inspections) if asks or "?" not in files],
     )
 
 
 def lacking(own: str, draft: str) -> str:
-    """Return the tables of a draft that a rov.toml lacks, as TOML; of those about the vehicle, only a base."""
-    there, told = tomlkit.parse(own), tomlkit.document()
-    left_out = {*there, *_HARDWARE} - ({"base"} if there.keys().isdisjoint(_HARDWARE) else {*()})
-    for name, table in tomlkit.parse(draft).items():
+    """Return the tables of a draft that a rov.toml lacks, as TOML; of those about the vehicle, only a base if the draft
+    has one, and none if rov.toml has any."""
+    there, drafted, told = tomlkit.parse(own), tomlkit.parse(draft), tomlkit.document()
+    hardware = {"base"} if "base" in drafted else {*_HARDWARE}
+    left_out = {*there, *_HARDWARE} - (hardware if there.keys().isdisjoint(_HARDWARE) else {*()})
+    for name, table in drafted.items():
         if name not in left_out:
             told.add(name, table)
     return tomlkit.dumps(told).strip()
@@ -145,9 +149,10 @@ def _is_bag(path: Path) -> bool:
     return not format_of(path).open
 
 
-def _questions(names: Mapping[str, str]) -> list[str]:
-    """Return a line for each of the first names, with the description of its values."""
-    return first_of([one_line(f'{_quoted(name)} = "?"{what and f"   # {what}"}') for name, what in names.items()])
+def _questions(names: Mapping[str, str], meant: Callable[[str], str] = lambda _: "") -> list[str]:
+    """Return a line for each of the first names, with what it seems to mean and the description of its values."""
+    told = ((f"{_quoted(name)} = {_quoted(meant(name) or '?')}", what) for name, what in names.items())
+    return first_of([one_line(f"{line}{what and f'   # {what}'}") for line, what in told])
 
 
 def dives(inspections: Sequence[Inspection]) -> list[list[str]]:

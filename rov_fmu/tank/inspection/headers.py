@@ -15,7 +15,7 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, PULSES, KnownColumns
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.csv_table import NUMBER, DataFileError
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
@@ -60,6 +60,8 @@ _NO_COMMAND = {"rc", "rcin", "max", "min", "limit", "n", "kgf", "lbf", *NOT_COMM
 """Words in headers that are no commands: of a pilot, limits, and forces."""
 _SHARES = {"force", "thrust", "torque"}
 """Words of forces, which are commands if their unit is one of commands: a thrust in percent."""
+_COMPONENTS = ("x", "y", "z", "north", "east", "down", "up")
+"""The last words of headers that are components of a vector, also without a unit."""
 _UNKNOWN_UNITS = {
     *("a", "ma", "ah", "mah", "w", "wh", "c", "degc", "f", "k", "g", "hz", "rpm", "psi", "dbar", "ut", "gauss", "n"),
     *("percent", "pct", "raw", "count", "counts", "fathom", "fathoms", "fm", "id", "std", "var"),
@@ -242,7 +244,7 @@ class _CsvColumn:
         for name in takewhile(bool, candidates):
             quantity = QUANTITIES.get(name)
             own, unit = name_and_unit(self.title, quantity.units if quantity else TIMES)
-            is_sure = not (quantity and quantity.is_velocity) or own[-1] in ("x", "y", "z")
+            is_sure = not (quantity and quantity.is_velocity) or own[-1] in _COMPONENTS
             if unit and (is_sure or PLURALS.isdisjoint(words_in(self.title))):
                 return name
             if unit == "" and is_sure and name not in _WITH_UNIT and FALSE_FRIENDS.isdisjoint(own):
@@ -413,6 +415,20 @@ def one_of_several(title: str, numbers: Array) -> str:
     column = _CsvColumn.of(title, numbers)
     name = column.meant()
     return f"another {name} [{column.unit_of(name)}]" if name and len(numbers) else ""
+
+
+def meant_by_field(name: str, fields: Mapping[str, str]) -> str:
+    """Return what a field of a message of an unknown kind seems to mean, by its name and its range; empty for none.
+
+    `fields` has the ranges of all fields as `range_in_words` tells them; a quaternion has a field w.
+    """
+    numbers = [] if f"{name[:-1]}w" in fields else [float(match[0]) for match in NUMBER.finditer(fields[name])][:2]
+    column = _CsvColumn.of(re.sub(r"[/.\[\]]+", " ", name).strip(), np.array(numbers))
+    meant = column.meant()
+    if numbers and column.is_command(meant):
+        number = [int(word) for word in column.words.split() if word.isdigit()][-1:]
+        return f"u_{number[0] + name.endswith(']')} [{column.unit_of_command}]" if number else ""
+    return f"{meant} [{column.unit_of(meant)}]" if meant in QUANTITIES else ""
 
 
 def may_be_velocity(title: str, *, is_rotation: bool) -> bool:

@@ -52,8 +52,10 @@ class Signal:
     low: float
     high: float
     gaps: Sequence[tuple[float, float]]
+    """How long the gaps are, and when they begin after the begin of the log, s."""
     course: Sequence[float] = ()
-    """The mean in each of PARTS equal parts of the time; NaN where there is no sample. Empty without times."""
+    """The mean in each of PARTS equal parts of the time of the log; NaN where there is no sample. Empty without
+    times."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +154,13 @@ def _of_log(
     path: Path, log: Log, findings: Sequence[Finding], unread: Mapping[str, str], columns: Mapping[str, str]
 ) -> Inspection:
     """Return what a log contains, with its findings; `unread` has the columns that are not recognised."""
-    channels = tuple(
-        _signal(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
-        for channel in log.channels
-        if not channel.unused
-    )
+    used = [channel for channel in log.channels if not channel.unused]
+    times = [channel.samples[0] for channel in used if channel.count] + ([log.commands.rows] if log.commands else [])
+    ends = [float(end) for time in times for end in time[[0, -1]]]
+    clock = log.begin, min(ends, default=nan), max(ends, default=nan)
+    channels = tuple(_signal(one.quantity.name, one.quantity.unit, one.time, one.values, clock) for one in used)
     unread = {**unread, **log.unread}
-    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, tuple(findings), columns, log)
+    return Inspection(path, log.file, tuple(_commands(log, clock)), channels, unread, tuple(findings), columns, log)
 
 
 def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection:
@@ -177,7 +179,7 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
         rows, _, told = read_rows(path, kind, axis, columns)
         numbers = np.array([(row.command, row.value) for row in rows]).T
         units = ("1", next(iter(of_table[TABLES[kind]].units)))
-        channels = [*map(_signal, of_table, units, np.full(numbers.shape, nan), numbers)]
+        channels = [*map(_signal, of_table, units, np.full(numbers.shape, nan), numbers, [_NO_CLOCK] * len(units))]
     return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
 
 
@@ -198,31 +200,37 @@ def logs_among(tests: Sequence[Path], columns: Mapping[str, str] = {}) -> Sequen
     return [file for file in tests if not kind_of_table(file, columns)] or tests
 
 
-def _signal(name: str, unit: str, time: Array, values: Array) -> Signal:
+_Clock = tuple[float, float, float]
+"""The begin of a log, from which times count, and the first and the last time that it tells, s."""
+_NO_CLOCK = (nan, nan, nan)
+
+
+def _signal(name: str, unit: str, time: Array, values: Array, clock: _Clock) -> Signal:
     there = np.isfinite(values)
     at, found = time[there], values[there]
     ends = (at[0], at[-1], found.min(), found.max()) if len(found) else (np.nan,) * 4
     start, end, low, high = map(float, ends)
-    return Signal(name, unit, start, end, len(found), rate(at), low, high, gaps(time, values), _course(at, found))
+    told = [(after - before, before - clock[0]) for before, after in gaps(time, values)]
+    return Signal(name, unit, start, end, len(found), rate(at), low, high, told, _course(at, found, *clock[1:]))
 
 
-def _course(time: Array, values: Array) -> list[float]:
-    """Return the mean in each of PARTS equal parts of the time, where there is any."""
+def _course(time: Array, values: Array, start: float, end: float) -> list[float]:
+    """Return the mean in each of PARTS equal parts of the time from a start to an end, s, where there is any."""
     if len(time) < 2 or not time[0] < time[-1] < np.inf:
         return []
-    ends = np.linspace(time[0], np.nextafter(time[-1], np.inf), PARTS + 1)
-    parts = [values[(time >= start) & (time < end)] for start, end in pairwise(ends)]
+    ends = np.linspace(start, np.nextafter(end, np.inf), PARTS + 1)
+    parts = [values[(time >= low) & (time < high)] for low, high in pairwise(ends)]
     return [float(part.mean()) if len(part) else nan for part in parts]
 
 
-def _commands(log: Log) -> Iterator[Signal]:
+def _commands(log: Log, clock: _Clock) -> Iterator[Signal]:
     if not log.commands:
         return
     rows = log.commands.rows
     loads = {axis.external: axis.load for axis in AXES.values()}
     for name, values in zip(log.commands.thrusters, log.commands.at(rows).T, strict=True):
         is_named = log.follows_axis or name in loads
-        yield _signal(name if is_named else f"thruster {name}", loads.get(name, "1"), rows, values)
+        yield _signal(name if is_named else f"thruster {name}", loads.get(name, "1"), rows, values, clock)
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import EULER, QUANTITIES, RATES, VECTORS
+from rov_fmu.tank.catalogue import EARTH, EULER, QUANTITIES, RATES, VECTORS
 from rov_fmu.tank.channels import Topic, channels_of
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
@@ -113,8 +113,9 @@ _IMU = ("roll angle", "pitch angle", "heading", "roll velocity", "pitch velocity
 @pytest.mark.parametrize(
     ("name", "valid", "invalid"),
     [
-        ("dvl_valid", _AXES, ()),
-        ("velocity_valid", _AXES, ()),
+        ("dvl_valid", (*_AXES, *EARTH), ()),
+        ("velocity_valid", (*_AXES, *EARTH), ()),
+        ("north velocity valid", EARTH[:1], ()),
         ("surge velocity valid", _AXES[:1], ()),
         ("DepthValid [-]", ("depth", "pressure"), ()),
         ("heading_invalid (0/1)", (), ("heading",)),
