@@ -458,9 +458,12 @@ def with_gap(folder: Path, *titles: str) -> Path:
     time: Array = np.arange(0.0, 60.0, 0.1)
     push, columns = 0.3 * np.sign(np.sin(2.0 * time) + 0.2), ["l", "r", "t"]
     blank = (time < 12.0) | ((time > 24.01) & (time < 29.99))
+    speed = np.zeros(len(time))
+    for n, c in enumerate(push[:-1]):
+        speed[n + 1] = speed[n] + 0.2 * (c - speed[n])  # a time constant of half a second
     rows = [
-        f"{t:.1f},{c},{c},{c},{t:.2f}{f',{c}' * len(titles) if not b else ',' * len(titles)}"
-        for t, c, b in zip(time, push, blank, strict=True)
+        f"{t:.1f},{c},{c},{c},{t:.2f}{f',{v:.4f}' * len(titles) if not b else ',' * len(titles)}"
+        for t, c, v, b in zip(time, push, speed, blank, strict=True)
     ]
     header = ",".join(["time [s]", *(f"u_{name} [1]" for name in columns), "depth [m]", *titles])
     (folder / "dive.csv").write_text("\n".join([header, *rows]), encoding="utf-8")

@@ -16,7 +16,7 @@ from rov_fmu.vehicle.writer import write_tuned
 from tests.commands import BARE, FEW_TESTS, WRITING
 from tests.conftest import without_page
 
-ALONE = {("simulate", "plot"), ("fly", "output"), ("sitl", "log")}
+ALONE = {("simulate", "plot"), ("fly", "output"), ("sitl", "log"), ("sitl", "parameters")}
 ALONE |= {("study", "output"), ("identify", "report"), ("inspect", "report")}
 ALONE |= {("export", "folder"), ("system", "output")}
 """What only commands write, or what the tests of studies and bridges compare."""
