@@ -83,7 +83,14 @@ def _find_given(_: click.Context, __: click.Parameter, given: str | None) -> Pat
     return None if given is None else find_vehicle(given)
 
 
-_vehicle_or_videoray = partial(_vehicle, default=str(VIDEORAY))
+def _or_videoray(_: click.Context, __: click.Parameter, given: str | None) -> Path:
+    """Return the vehicle file that is given, or, with a line that says so, that of the VideoRay."""
+    if given is None:
+        print_message("rov-fmu: no vehicle is given, so this is the VideoRay")
+    return VIDEORAY if given is None else find_vehicle(given)
+
+
+_vehicle_or_videoray = partial(_vehicle, required=False, callback=_or_videoray)
 
 
 class _Choice(click.Choice[Any]):

@@ -99,15 +99,19 @@ def run_process(program: str, main: Callable[[], int]) -> int:
 
 
 def _end_interrupted(program: str) -> None:
-    """Clean up, print one line, and end the process without waiting for any thread."""
+    """Clean up, print one line unless this is the usual end, and end the process without waiting for any thread."""
     from rov_fmu.io.interrupts import UNINTERRUPTED, clean_up_everything
 
     with UNINTERRUPTED:  # no other thread begins or prints anything more
+        code = 130
         try:
-            clean_up_everything()
-            _print_error(program, _INTERRUPTED, 130)
+            if clean_up_everything():
+                code = 0
+                sys.stdout.flush()
+            else:
+                _print_error(program, _INTERRUPTED, code)
         finally:
-            os._exit(130)
+            os._exit(code)
 
 
 def _print_error(program: str, message: str, code: int) -> int:

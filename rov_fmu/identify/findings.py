@@ -536,9 +536,9 @@ def headline(result: AxisResult) -> str:
     if told is None:
         return ""
     value, _, ends = in_words(*told.steady, result.axis.unit).partition(" (")
-    if not is_known(half_width(told.steady)):
-        value, ends = "a speed that is not known", f"{ends[:-1]}"
     way = result.axis.positive if told.steady[0] > 0.0 else result.axis.negative
+    if not is_known(half_width(told.steady)):
+        return f"{way} a speed that is not known at {told.command:.0%}"
     return f"{way} {value.removeprefix('-')} at {told.command:.0%}, {ends.removesuffix(')')}"
 
 

@@ -1,8 +1,8 @@
-"""What an identification tells while it works: its stages, with their usual shares of the time, and first answers."""
+"""What an identification tells while it works: its stages, and first answers."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from math import exp, inf
+from math import inf, nan
 
 import numpy as np
 
@@ -23,16 +23,6 @@ OnAnswer = Callable[[str, str], None]
 """A function that is called with the name of an axis, and with what is known about it so far."""
 
 HYPOTHESES, REFINED = "hypotheses", "exact derivatives"
-_STAGES = {
-    "start 1": (0.20, 12.0),
-    "start 2": (0.04, 8.0),
-    "all samples": (0.12, 4.0),
-    HYPOTHESES: (0.30, 2.5),
-    REFINED: (0.09, 1.0),
-    "predicting what was left out": (0.15, 6.0),
-}
-"""The stages in their order, each with its usual share of the work, and the number of steps in which 63 % of it are
-done, because nothing tells how many steps there will be. The numbers are about the means over recorded logs."""
 _USUAL = 0.5
 """The command of which the speed is told, or the strongest tested one if that is weaker."""
 
@@ -42,30 +32,11 @@ class ProgressReport:
 
     def __init__(self, on_progress: Progress = silent, on_answer: OnAnswer | None = None) -> None:
         self._on_progress, self._on_answer = on_progress, on_answer
-        self._share, self._done = 0.0, dict[str, float]()
         self._told: dict[str, str] = {}
-        self._left_out = set[str]()
 
-    def leave_out(self, *stages: str) -> None:
-        """Take stages out of the work, which it is known not to have."""
-        self._left_out.update(stages)
-
-    def steps(self, stage: str, words: str = "") -> Callable[[float], None]:
-        """Return a function to call with the number of steps of a stage that are done. `words` name the stage.
-
-        The share of the work never goes back. A stage that was left out is no part of the work.
-        """
-        later = [name for name in [*_STAGES][[*_STAGES].index(stage) + 1 :] if name not in self._left_out]
-        share, usual = _STAGES[stage]
-
-        def show(count: float) -> None:
-            self._done |= {name: _STAGES[name][0] for name in self._done} | {stage: share * (1.0 - exp(-count / usual))}
-            left = share - self._done[stage] + sum(_STAGES[name][0] for name in later)
-            done = sum(self._done.values())
-            self._share = max(self._share, done / (done + left))
-            self._on_progress(words or stage, self._share)
-
-        return show
+    def steps(self, stage: str) -> Callable[[float], None]:
+        """Return a function to call at each step of a stage. Nothing tells how many steps there will be."""
+        return lambda _: self._on_progress(stage, nan)
 
     def fits(self, objective: Objective, minimum: Minimum) -> None:
         """Tell the answers of a fit, where they are others than before."""

@@ -64,7 +64,6 @@ def serve(path: Path, *, host: str, port: int, duration: float | None, parameter
             print_message(f"rov-fmu: {words}")
         if floats := _floats(setup):
             print_message(f"rov-fmu: {floats}")
-        paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
         def end() -> None:
             connection.end()
@@ -75,7 +74,8 @@ def serve(path: Path, *, host: str, port: int, duration: float | None, parameter
             elif setup.log:
                 paragraph(console(), "No log was written, because no row was complete.")
 
-        with cleaned_up(end):
+        with cleaned_up(end, ends_usually=True):
+            paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
             connection.serve(server, duration or inf)
 
 

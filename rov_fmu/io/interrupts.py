@@ -13,8 +13,8 @@ UNINTERRUPTED = RLock()
 """A thread holds this lock during an action that must not be interrupted half-way.
 
 The main thread takes it and keeps it when it ends the process; see `clean_up_everything`."""
-_PENDING: list[Callable[[], object]] = []
-"""Functions that still have to clean up, the oldest first."""
+_PENDING: list[tuple[Callable[[], object], bool]] = []
+"""Functions that still have to clean up, the oldest first; and whether an interrupt is the usual end of their work."""
 _ATTEMPTS = 50
 """The number of attempts to remove a folder, since a thread may still be writing into it."""
 _PAUSE = 0.01
@@ -22,15 +22,18 @@ _PAUSE = 0.01
 
 
 @contextmanager
-def cleaned_up(clean: Callable[[], object]) -> Iterator[None]:
-    """Call `clean` when the block ends, and also when an interrupt ends the process within the block."""
+def cleaned_up(clean: Callable[[], object], *, ends_usually: bool = False) -> Iterator[None]:
+    """Call `clean` when the block ends, and also when an interrupt ends the process within the block.
+
+    `ends_usually` is true if an interrupt is the usual end of the block.
+    """
     with UNINTERRUPTED:
-        _PENDING.append(clean)
+        _PENDING.append((clean, ends_usually))
     try:
         yield
     finally:
         with UNINTERRUPTED:
-            _PENDING.remove(clean)
+            _PENDING.remove((clean, ends_usually))
             clean()
 
 
@@ -49,15 +52,19 @@ def temporary_folder(prefix: str, parent: str | None = None) -> Iterator[str]:
         yield folder
 
 
-def clean_up_everything() -> None:
-    """Call all pending functions, the latest first, because the process is about to end.
+def clean_up_everything() -> bool:
+    """Call all pending functions, the latest first, because the process is about to end. Returns True if an interrupt
+    is its usual end, and each of these functions succeeds.
 
     The caller holds UNINTERRUPTED until the process has ended. So every other thread has finished its protected action,
     and no thread begins another one.
     """
-    for clean in reversed(_PENDING):
+    done = 0
+    for clean, _ in reversed(_PENDING):
         with suppress(Exception):
             clean()
+            done += 1
+    return done == len(_PENDING) and any(usual for _, usual in _PENDING)
 
 
 def _remove(folder: str) -> None:

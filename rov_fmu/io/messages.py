@@ -20,7 +20,8 @@ NO_FILE = "there is no such file"
 """The reason if a file is missing."""
 
 Progress = Callable[[str, float], None]
-"""A function that is called with the name of the next step and the share of the work that is done, from 0 to 1."""
+"""A function that is called with the name of the next step and the share of the work that is done, from 0 to 1, or NaN
+where nothing tells it."""
 
 
 def silent(_step: str, _share: float) -> None:

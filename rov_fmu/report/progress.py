@@ -90,12 +90,13 @@ class Parts:
             self.print(f"{name}: done in {running.so_far:.1f} s")
 
     def show(self, name: str, step: str, share: float, count: str = "") -> None:
-        """Show the step of a running part, and the share that is done or, if given, a count."""
-        running, count = self._running[name], count or f"{share:.0%}"
+        """Show the step of a running part, and the share that is done, if it is known, or a count, if it is given."""
+        running, count = self._running[name], count or (f"{share:.0%}" if share >= 0.0 else "")
         with self._lock:
-            running.words, running.share = f"{step}, {count}", share
+            running.words, running.share = f"{step}{count and f', {count}'}", share
         if self._display and running.task is not None:
-            self._display.update(running.task, completed=min(share, 0.999), description=one_line(step), count=count)
+            done = min(share, 0.999) if share >= 0.0 else 0.0
+            self._display.update(running.task, completed=done, description=one_line(step), count=count)
 
     def tell(self, subject: str, answer: str) -> None:
         """Show the answer about a subject that is known so far. On a terminal, it replaces the one before."""

@@ -89,9 +89,9 @@ class Command:
             return [child for child in children if "_serve" in " ".join(child.cmdline())]
         return []
 
-    def press_ctrl_c(self) -> str:
+    def press_ctrl_c(self, code: int = 130) -> str:
         """Press Ctrl-C and return what the command prints until all its processes have ended."""
-        return self._ended_by(lambda: os.write(self._terminal, b"\x03"))
+        return self._ended_by(lambda: os.write(self._terminal, b"\x03"), code)
 
     def __enter__(self) -> "Command":
         return self
@@ -102,14 +102,14 @@ class Command:
     def terminate(self) -> str:
         return self._ended_by(self.process.terminate)
 
-    def _ended_by(self, action: Callable[[], object]) -> str:
+    def _ended_by(self, action: Callable[[], object], code: int = 130) -> str:
         children = psutil.Process(self.process.pid).children(recursive=True)
         action()
         _, err = self.process.communicate(timeout=PATIENCE)
         self._reader.join(PATIENCE)
         _, alive = psutil.wait_procs(children, PATIENCE)
         assert not alive
-        assert self.process.returncode == 130, err
+        assert self.process.returncode == code, err
         assert not [*self.temporary.iterdir()]
         return without_progress(err or "")
 
@@ -208,3 +208,10 @@ def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     with Command(["-m", "rov_fmu", "list"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as command:
         command.wait_until(begun.exists)
         assert command.press_ctrl_c() == LINE
+
+
+def test_ctrl_c_is_the_usual_end_of_sitl(tmp_path: Path) -> None:
+    with Command(["-m", "rov_fmu", "sitl", "bluerov2", "--port", "0"], tmp_path) as command:
+        command.wait_until(lambda: b"Ctrl-C ends it" in command.shown)
+        assert "interrupted" not in command.press_ctrl_c(0)
+    assert b"s of flight" in command.shown

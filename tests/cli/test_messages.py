@@ -254,3 +254,11 @@ def test_an_implausible_tuning_is_a_warning_with_the_reason(
     for line, words in zip(lines, expected, strict=True):
         assert line.startswith(f"rov-fmu: warning: {words}")
         assert "Check the wanted" in line
+
+
+def test_a_command_without_a_vehicle_says_that_it_takes_the_videoray(tmp_path: Path, capsys: Capsys) -> None:
+    said = "rov-fmu: no vehicle is given, so this is the VideoRay\n"
+    for vehicle in ([], ["videoray"]):
+        assert main(["export", *vehicle, "--to", "sdf", "-o", str(tmp_path / f"{len(vehicle)}.sdf")]) == 0
+        assert capsys.readouterr().err.count(said) == (not vehicle)
+    assert (tmp_path / "0.sdf").read_bytes() == (tmp_path / "1.sdf").read_bytes()

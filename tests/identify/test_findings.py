@@ -15,6 +15,7 @@ from rov_fmu.identify.findings import (
     by_heading,
     extrapolated,
     findings_of,
+    headline,
     prediction_name,
     repairs,
     result_sentences,
@@ -22,6 +23,8 @@ from rov_fmu.identify.findings import (
     with_error,
 )
 from rov_fmu.identify.result import (
+    Answer,
+    AxisResult,
     Identification,
     IdentifiedCoefficient,
     IdentifiedEffect,
@@ -576,3 +579,13 @@ def test_an_error_is_the_larger_half_of_the_interval(
 )
 def test_a_direction_without_a_test_is_extrapolated(tested: tuple[float, float], words: list[str]) -> None:
     assert extrapolated(surge(tested=tested))[1:] == words
+
+
+def test_a_speed_that_is_not_known_has_no_interval() -> None:
+    estimates = (0.6, (0.57, 0.68)), (0.6, (0.00046, 1.5))
+    known, unknown = (
+        headline(AxisResult(HEAVE, answers=(Answer(HEAVE, 0.5, steady, (1.0, (0.9, 1.1)), (1.0, (0.9, 1.1))),)))
+        for steady in estimates
+    )
+    assert known == "down 0.60 m/s at 50%, 0.57 to 0.68"
+    assert unknown == "down a speed that is not known at 50%"

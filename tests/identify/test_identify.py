@@ -354,11 +354,11 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
     """Outliers count as errors of the predictions: the errors are below this share of those of no change."""
     path, random = folder_of(tmp_path / "tests", KNOWN, FORCES), np.random.default_rng(3)
     write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
-    shares: list[float] = []
-    (heave,) = identify(load_tests(path), lambda _, share: shares.append(share)).axes
-    assert shares == sorted(shares), "progress"
-    assert (shares[0], 0.85 <= shares[-1] <= 1.0) == (0.0, True)
-    assert max(np.diff(shares)) < 0.5, "it does not stand still"
+    stages = dict[str, list[float]]()
+    (heave,) = identify(load_tests(path), lambda stage, share: stages.setdefault(stage, []).append(share)).axes
+    first, *others = stages
+    assert (stages.pop(first), others[-1]) == ([0.0], "predicting what was left out")
+    assert np.isnan(np.concatenate([*stages.values()])).all(), "nothing tells how long a stage will be"
     check_answers(heave, near)
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"

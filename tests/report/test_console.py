@@ -202,6 +202,20 @@ def test_what_is_left_follows_from_the_share_that_is_done(monkeypatch: pytest.Mo
     assert "about 30 s left" in capsys.readouterr().err
 
 
+def test_a_step_whose_share_is_not_known_has_neither_a_percentage_nor_a_time_left(capsys: Capsys) -> None:
+    shown = Parts(None)
+    shown.begin("work")("trying causes", nan)
+    shown.print_running()
+    assert capsys.readouterr().err == "rov-fmu: trying causes (0 s so far)\n"
+    display = Display(console=Console(file=io.StringIO(), width=100))
+    shown = Parts(display)
+    shown.begin("work")("trying causes", nan)
+    (task,) = display.tasks
+    assert (task.completed, task.description, task.fields["count"]) == (0.0, "trying causes", "")
+    shown.end("work")
+    assert display.finished
+
+
 def test_an_answer_takes_the_place_of_the_one_before(capsys: Capsys) -> None:
     """In a pipe, each has a line."""
     answers = ["heave 0.5 m/s at 50%, fits the depth to 9 cm", "heave 0.46 m/s at 50%, fits the depth to 2 cm"]

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.util import find_spec
@@ -118,9 +119,16 @@ def _terminals(made: Companion) -> list[Terminal]:
     return found
 
 
+def _bare(title: str) -> str:
+    """Return the name in a header that may have the unit of the column in brackets: `z (m)`."""
+    return re.sub(r" \((s|m|m/s)\)$", "", title)
+
+
 def timed_rows(path: Path, columns: tuple[str, ...]) -> Rows:
     """Return the rows of a table by their times, with the depth first. Raises DataFileError."""
-    series = read_series(path, lambda name: None if name in columns else f"must be one of {', '.join(columns)}")
+    wrong = f"must be one of {', '.join(columns)}"
+    read = read_series(path, lambda name: None if _bare(name) in columns else wrong)
+    series = {_bare(name): values for name, values in read.items()}
     if missing := [name for name in columns[1:-1] if name not in series]:
         raise DataFileError(f"{path}: column {missing[0]!r} is missing: the columns are {', '.join(columns)}")
     time, *others = ([*series[next(iter(series))]], *(series.get(name) for name in columns[1:]))

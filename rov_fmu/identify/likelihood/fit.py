@@ -139,14 +139,13 @@ def fit_all(
     score = evidence(quick, ends[0])
     start = StructureFit({}, quick, ends[0], score, score)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
-    work.leave_out(*((HYPOTHESES, REFINED) if is_mistake else ()))
     search, now = _searched_for_structure(start, full, work, is_mistake=is_mistake)
     full, near, is_wrong = now.objective, now.minimum, is_mistake or search.now.is_hopeless
     before = windows(search.plain.objective, search.plain.minimum.z)
     best = near
     if not is_wrong:
         # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-        work.steps("exact derivatives")(0)
+        work.steps(REFINED)(0)
         best = refined(full, near)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value
@@ -186,7 +185,7 @@ def _searched_for_structure(
     Where the model is wrong along all axes, thinned logs tell as well what explains it. All samples are fitted to the
     end only when something does.
     """
-    tried, show_tried = count(), work.steps("hypotheses")
+    tried, show_tried = count(), work.steps(HYPOTHESES)
 
     def searched(plain: StructureFit, before: StructureSearch | None = None) -> StructureSearch:
         size = len(plain.minimum.z) * sum(len(one.innovations) for one in plain.minimum.data)

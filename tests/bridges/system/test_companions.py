@@ -90,6 +90,10 @@ def test_a_current_follows_its_file_at_every_place_and_as_a_profile(tmp_path: Pa
         assert pytest.approx(velocity, abs=1e-15) == [np.interp(z, levels[:, 0], levels[:, k]) for k in (1, 2, 3)]
         half = [np.interp(0.5 * z, levels[:, 0], levels[:, k]) for k in (1, 2, 3)]
         assert pytest.approx(half, abs=1e-15) == [water.V_N, water.V_E, water.V_D]
+    title, _, rows = ROWS.partition("\n")
+    units = {"time": "time (s)", "z": "z (m)", **{name: f"{name} (m/s)" for name in ("V_N", "V_E", "V_D")}}
+    with_units = ",".join(units[name] for name in title.split(","))
+    assert levels_of(water_of(tmp_path, f"{with_units}\n{rows}", "b")).shape == levels_of(water).shape
     for text, message in (
         (ROWS.replace("V_E", "V_X"), "column 'V_X': must be one of time, z, V_N, V_E"),
         ("time,z\n0,1\n", "column 'V_N' is missing"),
