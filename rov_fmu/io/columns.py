@@ -237,7 +237,9 @@ def _find_columns(
     """Return the columns that are read, by their index in the header. Raises DataFileError."""
     known = KnownColumns(columns)
     if not any(_may_be_header(title, known) for title in header[:_MOST_COMPARED]):
-        raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {_why_no_header(columns, hint)}")
+        needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
+        reason = f"none of these headers is known; the first line must have the headers {needed}{hint}"
+        raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
     file_columns: dict[int, FileColumn] = {}
     names: set[str] = set()
     wrong = []
@@ -257,12 +259,6 @@ def _find_columns(
     if wrong:
         raise DataFileError(*wrong[:MOST])
     return file_columns
-
-
-def _why_no_header(columns: Mapping[str, Column], hint: str) -> str:
-    """Return what the first line of a file must be, none of whose headers is known."""
-    needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
-    return f"none of these headers is known; the first line must have the headers {needed}{hint}"
 
 
 def _others(header: Sequence[str], read: Container[int]) -> list[str]:

@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
-from datetime import datetime
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -17,13 +16,13 @@ import numpy as np
 
 from rov_fmu.io.csv_table import UnreadableFileError, open_text
 from rov_fmu.tank.catalogue import COCKPIT, DVL_ANGLES, DVL_PLACE, DVL_VELOCITY
+from rov_fmu.tank.columns import seconds
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers.content import Content, content_of
 
 _Message = tuple[Source, float, Mapping[str, float]]
 """The source of a message, its time, s, and its numbers by the names of their fields."""
 _SENTENCE = re.compile(r"\$([^$*]+)\*([0-9A-F]{2})", re.IGNORECASE)
-_EPOCH = datetime(1970, 1, 1)
 _AGAIN = 1e-6
 """The time that passes between two messages of which the second one has an earlier time, s."""
 _POSITION = "position_local"
@@ -44,10 +43,9 @@ def read_videoray(path: Path, _: Collection[str]) -> Content:
             yield kind
             return
         date, clock, *numbers = cells
-        seconds = clock if "." in clock else f"{clock}.0"
-        since = datetime.strptime(f"{date} {seconds}", "%m/%d/%Y %H:%M:%S.%f") - _EPOCH
+        month, day, year = date.split("/")
         fields = zip(("depth", "heading", "pitch", "roll"), map(float, numbers), strict=True)
-        yield Source(COCKPIT, COCKPIT), since.total_seconds(), dict(fields)
+        yield Source(COCKPIT, COCKPIT), seconds(f"{year}-{month}-{day}T{clock}"), dict(fields)
 
     return _read(path, messages_in)
 
