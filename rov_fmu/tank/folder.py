@@ -471,13 +471,14 @@ def _ends(log: Log) -> tuple[float, float]:
 
 def _one_after_another(pairs: Sequence[tuple[str, Channel]]) -> Channel:
     """Return the channel of one quantity of one sensor, whose samples are in several files, each with its name."""
-    files, parts = zip(*pairs, strict=True)
-    times, values = ([getattr(part, name) for part in parts] for name in ("time", "values"))
+    (file, first), *others = pairs
+    if not others:
+        return replace(first, file=file)  # the columns of a file share their times
     return replace(
-        parts[0],
-        file=join_names(dict.fromkeys(files)),
-        time=np.concatenate(times) if parts[1:] else times[0],  # columns of a file share their times
-        values=np.concatenate(values),
+        first,
+        file=join_names(dict.fromkeys(name for name, _ in pairs)),
+        time=np.concatenate([part.time for _, part in pairs]),
+        values=np.concatenate([part.values for _, part in pairs]),
     )
 
 

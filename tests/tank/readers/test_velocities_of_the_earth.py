@@ -24,9 +24,9 @@ ANGLES = {"heading [rad]": HEADING, "roll [rad]": ROLL, "pitch [rad]": PITCH}
 HORIZONTAL = {"velocity_north [m/s]": NORTH, "velocity_east [m/s]": EAST}
 
 
-def read(folder: Path, written: dict[str, Array], **tables: dict[str, str]) -> Log:
+def read(folder: Path, written: dict[str, Array], tables: RovTables | None = None) -> Log:
     table(folder / "dive.csv", ",".join(["time [s]", *written]), TIME, *written.values())
-    names, wrong = names_of(BLUEROV2, RovTables(**tables))
+    names, wrong = names_of(BLUEROV2, tables or RovTables())
     assert not wrong
     (log,) = read_logs(folder / "dive.csv", BLUEROV2, names, is_part=True)
     return checked_log(log)
@@ -43,7 +43,7 @@ def test_they_are_turned_into_the_frame_of_the_body(tmp_path: Path, title: str, 
 def test_rov_toml_names_them_with_units_and_signs(tmp_path: Path) -> None:
     own = {"vn": 100.0 * NORTH, "ve": -100.0 * EAST, "vu": -100.0 * DOWN}
     meant = {"vn": "north velocity [cm/s]", "ve": "-velocity_east [cm/s]", "vu": "velocity up [cm/s]"}
-    log = read(tmp_path, {**ANGLES, **own}, columns=meant)
+    log = read(tmp_path, {**ANGLES, **own}, RovTables(columns=meant))
     assert measured(log, "heave velocity") == pytest.approx(DIVE.velocity[:, 2], abs=1e-5)
     assert measured(log, "sway velocity") == pytest.approx(DIVE.velocity[:, 1], abs=1e-5)
     _, wrong = names_of(BLUEROV2, RovTables(topics={"/dvl.vn": "north velocity [m]"}))
