@@ -83,10 +83,12 @@ def _find_given(_: click.Context, __: click.Parameter, given: str | None) -> Pat
     return None if given is None else find_vehicle(given)
 
 
-def _or_videoray(_: click.Context, __: click.Parameter, given: str | None) -> Path:
-    """Return the vehicle file that is given, or, with a line that says so, that of the VideoRay."""
-    if given is None:
-        print_message("rov-fmu: no vehicle is given, so this is the VideoRay")
+_DEFAULT = "no vehicle is given"
+
+
+def _or_videoray(context: click.Context, _: click.Parameter, given: str | None) -> Path:
+    """Return the vehicle file that is given, or that of the VideoRay, which a command that is done then tells."""
+    context.meta[_DEFAULT] = given is None
     return VIDEORAY if given is None else find_vehicle(given)
 
 
@@ -217,6 +219,14 @@ def _commands(context: click.Context) -> None:
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
+
+
+@_commands.result_callback()
+@click.pass_context
+def _done(context: click.Context, _: object) -> None:
+    """Tell that the vehicle is the VideoRay because none was given."""
+    if context.meta.get(_DEFAULT):
+        print_message(f"rov-fmu: {_DEFAULT}, so this is the VideoRay")
 
 
 # ---- build -----------------------------------------------------------------------------------------------------------
