@@ -51,7 +51,7 @@ def test_every_state_and_angle_can_be_set_at_the_start(name: str) -> None:
 
 
 def test_a_vehicle_that_nothing_moves_is_said_to_need_a_command(capsys: Capsys) -> None:
-    assert main(["simulate", "--set", "m_rov=7"]) == 0
+    assert main(["simulate", "videoray", "--set", "m_rov=7"]) == 0
     out, err = capsys.readouterr()
     assert (out.splitlines()[-1], err) == ("No command is set: try --set u_l=0.3", "")
 
