@@ -114,7 +114,7 @@ def pytest_sessionfinish(session: pytest.Session) -> Iterator[None]:
     yield
     if hasattr(session.config, "workerinput"):
         return
-    removed_later = {action.args[0] for action in interrupts._PENDING if isinstance(action, partial)}
+    removed_later = {action.args[0] for action, _ in interrupts._PENDING if isinstance(action, partial)}
     left = [path for path in _places() if path not in session.config.stash[_BEFORE] and str(path) not in removed_later]
     if left:
         print(f"\nThe tests left behind: {', '.join(map(str, left))}", file=sys.stderr)

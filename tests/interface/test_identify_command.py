@@ -11,7 +11,6 @@ import pytest
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.related import origin
-from rov_fmu.identify.progress import HYPOTHESES, ProgressReport
 from rov_fmu.interface.identify_command import identify_tests
 from rov_fmu.io.messages import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -121,25 +120,3 @@ def _check_is_the_same(vehicle: Vehicle, path: Path) -> None:
     )
     assert name.endswith(".toml")
     assert content == path.read_bytes()
-
-
-def test_a_stage_that_is_left_out_is_no_part_of_the_work() -> None:
-    """The stages that are left are then a larger share of it, and so are those that are done."""
-    shares: dict[str, list[float]] = {}
-    for stages in (
-        ["start 1", "predicting what was left out"],
-        ["start 1", "hypotheses", "predicting what was left out"],
-    ):
-        work = ProgressReport(lambda stage, share: shares.setdefault(stage, []).append(share))
-        for stage in stages:
-            show = work.steps(stage)
-            for count in range(3):
-                show(count)
-    without, with_ = shares["predicting what was left out"][0], shares["predicting what was left out"][3]
-    assert 0.0 < shares["start 1"][0] + 1e-9 < without < with_ < 1.0
-    assert all(before <= after for before, after in pairwise(shares["predicting what was left out"][:3]))
-    known = list[float]()
-    work = ProgressReport(lambda _, share: known.append(share))
-    work.leave_out(HYPOTHESES)
-    work.steps("start 1")(2)
-    assert known[0] > shares["start 1"][2], "what is known to be left out is not waited for"
