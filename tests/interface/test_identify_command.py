@@ -44,7 +44,7 @@ def test_the_progress_names_what_is_done_and_never_goes_back(
     _check_is_the_same(identification.vehicle, tmp_path / "rov.toml")
     assert [*begun] == ["reading the tests", "identifying the vehicle", *["drawing the report"] * with_report]
     for calls in begun.values():
-        shares = [share for _, share in calls]
+        shares = [share for _, share in calls if not np.isnan(share)]  # nobody knows how long a fit takes
         assert all(before <= after for before, after in pairwise(shares))
         assert not shares or (shares[0] == 0.0 and shares[-1] < 1.0)
     steps = [step for step, _ in begun["identifying the vehicle"]]
