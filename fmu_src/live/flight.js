@@ -466,7 +466,11 @@ class Replay {
   beginAnew(pilot, time) {
     for (const signal of this.recording.signals) {
       const { axis, isPosition, times, values } = signal;
-      pilot.put(axis, isPosition, between(times, (k) => values[k], time));
+      pilot.put(
+        axis,
+        isPosition,
+        between(times, (k) => values[k], time),
+      );
       if (isPosition) pilot.put(axis, false, this.rate(signal, time));
     }
     pilot.model.turn();
