@@ -352,8 +352,8 @@ WRITTEN = {
     "force": ["time [us],u_t [N.m 40],z [mm],voltage [V]", *(f"{10**6 * n},{n},{n},16" for n in range(10))],
     "times of day": [
         "Date;Time;u_t [%];depth [m]",
-        *(f"10/8/25;11:59:{n + 50} PM;{n};{n}" for n in range(10)),
-        *(f"10/9/25;12:00:0{n} AM;{n};{n}" for n in range(10)),
+        *(f"2025-10-08;23:59:{n + 50};{n};{n}" for n in range(10)),
+        *(f"2025-10-09;00:00:0{n};{n};{n}" for n in range(10)),
     ],
     "decimal commas in quotes": ["time [s],u_t [%],depth [m]", *(f'"{n},5","{n},500","0,{n}"' for n in range(10))],
     "a clock set back": [
