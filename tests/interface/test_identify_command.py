@@ -54,13 +54,14 @@ def test_the_progress_names_what_is_done_and_never_goes_back(
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of axes that no log shows
 def test_a_log_alone_is_identified_with_a_vehicle_that_is_assumed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The printout begins with what is assumed; no verdict is good, and the file says which numbers are assumed."""
-    time = 0.2 * np.arange(150.0)
+    time = 0.2 * np.arange(200.0)
     command = np.where(time % 10.0 < 5.0, 0.5, 0.0)
-    still = [np.zeros(150)] * 4
+    still = [np.zeros(200)] * 4
     titles = ",".join(["time [s]", *(f"u_{n} [1]" for n in range(1, 7)), "heave velocity [m/s]"])
     # A first-order response, sampled without noise.
     speed = np.where(time % 10.0 < 5.0, 1.0 - np.exp(-(time % 10.0) / 0.7), np.exp(-(time % 10.0 - 5.0) / 0.7))
