@@ -178,8 +178,8 @@ class Fmu(ABC):
 
     @property
     def commands(self) -> list[str]:
-        """The inputs that have bounds."""
-        found = [name for name in self.inputs if self.number(name, "min") is not None]
+        """The inputs that have two bounds."""
+        found = [name for name in self.inputs if self.number(name, "max") is not None]
         assert found
         return found
 

@@ -119,16 +119,19 @@ class Model {
     return this.fractions.get(name) ?? (place === undefined ? 0 : this.values[place]);
   }
 
-  /** Sets a variable if the vehicle has it. @param {string} name @param {number} value */
+  /** Sets a variable if the vehicle has it. A command saturates at full thrust, as in the FMU. @param {string} name @param {number} value */
   set(name, value) {
     const place = this.places.get(name);
     if (place === undefined) return;
     const { pulse, commands } = this.vehicle;
     this.values[place] = value;
-    if (pulse && commands.includes(name)) {
+    if (!commands.includes(name)) return;
+    const held = Math.max(-1, Math.min(1, value));
+    this.values[place] = held;
+    if (pulse) {
       const [low, neutral, high] = pulse;
-      this.fractions.set(name, value);
-      this.values[place] = neutral + value * (value > 0 ? high - neutral : neutral - low);
+      this.fractions.set(name, held);
+      this.values[place] = neutral + held * (held > 0 ? high - neutral : neutral - low);
     }
   }
 

@@ -408,8 +408,7 @@ class Layout:
         if (moves_horizontally and self.has_attitude) or (self.waves and self.has(HEAVE)):
             inputs |= CURRENT_DOWN
         if self.voltage is not None:
-            lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
-            inputs["voltage"] = voltage_declaration(min(lows), max(highs), self.voltage)
+            inputs["voltage"] = voltage_declaration(*self.voltage_range, self.voltage)
         return inputs | self.acceleration | (ELEVATION if self.waves and self.surface else {}) | self.forces_at_points
 
     @cached_property
@@ -447,6 +446,14 @@ class Layout:
         several = [curve for curve in self.curves if len(curve.tables) > 1]
         names = grouped(((curve.tables[0].voltage, curve.tables[-1].voltage), curve.name) for curve in several)
         return {bounds: " and ".join(curves) for bounds, curves in names.items()}
+
+    @cached_property
+    def voltage_range(self) -> tuple[float, float]:
+        """The range of the voltage, V, beyond which no curve changes: that of the tables if all curves have several."""
+        if any(len(curve.tables) < 2 for curve in self.curves):
+            return 0.0, inf
+        lows, highs = zip(*self.voltage_ranges, strict=True)
+        return min(lows), max(highs)
 
     @cached_property
     def usual_inputs(self) -> dict[str, float]:

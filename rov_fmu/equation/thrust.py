@@ -25,8 +25,6 @@ from .expression import (
 from .layout import Layout
 from .parts import Curve
 
-_VOLTAGE = Name("voltage")
-
 
 def thrust_formulas(layout: Layout, names: Names) -> Formulas:
     """Return formulas for the steady thrust (2), (9), (10) of every thruster, and for the angles of the fins.
@@ -35,7 +33,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
     """
     formulas = Formulas(names)
     if layout.voltage is not None:
-        _add_battery(formulas)
+        _add_battery(formulas, *layout.voltage_range)
     for name, gains in layout.gains.items():
         parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
@@ -58,7 +56,7 @@ def curve_formulas(curve: Curve) -> Formulas:
     """Return formulas from the command u_one of a thruster to its steady thrust, which is the last."""
     formulas = Formulas(Names(curve.coefficient(key) for key in curve.keys))
     if "V_0" in curve.keys or len(curve.tables) > 1:
-        _add_battery(formulas)
+        _add_battery(formulas, 0.0, inf)
     formulas.define(saturated(Name("u_one")), "command", "one")
     _add_steady_thrust(formulas, "one", curve, of(1.0))
     return formulas
@@ -69,8 +67,10 @@ def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
     return names("steady", thruster) if curve.has_lag else Name(f"F_{thruster}")
 
 
-def _add_battery(formulas: Formulas) -> None:
-    formulas.define(where(_VOLTAGE < 0.0, 0.0, _VOLTAGE), "battery")
+def _add_battery(formulas: Formulas, low: float, high: float) -> None:
+    voltage = Name("voltage")
+    held = where(voltage < low, low, voltage)
+    formulas.define(held if high == inf else where(voltage > high, high, held), "battery")
 
 
 def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
