@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from threading import Lock, get_ident
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,7 +31,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, RovError, StudyError, brief, reason_of, shown
 from rov_fmu.io.numbers import WORKERS
-from rov_fmu.io.output import Output, WriteError, put_whole
+from rov_fmu.io.output import Output, put_whole
 from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.figures import Array, Figures
 from rov_fmu.study.model import read_model, vehicle_model
@@ -129,15 +130,19 @@ def do_study(
 
         Results(folder)  # raises FileError about what another version or program wrote
     blocks = [*_blocks(study)]
-    _clean(folder / RUNS, study, {block.name for block in blocks}, force=force)
-    put_whole(Output(folder / STUDY, json.dumps(_told(study, blocks), indent=2, ensure_ascii=False).encode()))
+    others = _others(folder / RUNS, study, {block.name for block in blocks}, force=force)
     own = blocks[number - 1 :: parts]
     missing = [block for block in own if not (folder / RUNS / block.name).exists()]
     total, runs, failed = sum(len(block.values) for block in own), 0, 0
     before = total - sum(len(block.values) for block in missing)
     on_progress(StudyProgress(before, total, 0))
     try:
-        for block, content, lost in _done(study, missing, workers, scheduler) if missing else ():
+        done = _done(study, missing, workers, scheduler) if missing else iter(())
+        first = next(done, None)  # before anything is written or removed, because an FMU may not run at all
+        for other in others:
+            other.unlink()
+        put_whole(Output(folder / STUDY, json.dumps(_told(study, blocks), indent=2, ensure_ascii=False).encode()))
+        for block, content, lost in chain([first] if first else [], done):
             put_whole(Output(folder / RUNS / block.name, content))
             runs, failed = runs + len(block.values), failed + lost
             on_progress(StudyProgress(before + runs, total, failed))
@@ -158,17 +163,15 @@ def prepared(path: Path) -> Study:
     return prepare(plan, path, vehicle_model(load_vehicle(named_in(path, "vehicle", plan.vehicle, PlanError))))
 
 
-def _clean(folder: Path, study: Study, names: Collection[str], *, force: bool) -> None:
-    """Remove the last block of a plan that had fewer runs. Raises FileError about the rows of another plan."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WriteError(error.errno, error.strerror, str(error.filename or folder)) from error
+def _others(folder: Path, study: Study, names: Collection[str], *, force: bool) -> list[Path]:
+    """Return the files that are no block of the study, such as the last block of a plan that had fewer runs.
+
+    Raises FileError about the rows of another plan.
+    """
     others = [path for path in folder.glob("*.parquet") if path.name not in names]
     if (strange := [path for path in others if study.digest not in path.name]) and not force:
         raise FileError(f"{strange[0]}: has the rows of another plan or FMU: name another folder, or use --force")
-    for path in others:
-        path.unlink()
+    return others
 
 
 def _numbers_of(part: str | None) -> tuple[int, int]:
