@@ -20,6 +20,8 @@ from tests.damage import changed_bytes, changed_cells, changed_course, changed_l
 from tests.often import often, spread
 from tests.recordings import run, write_log
 
+pytestmark = pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # such a vehicle is seldom good
+
 LOG = "log_heave_a.csv"
 
 

@@ -369,6 +369,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of what no test told
 @pytest.mark.parametrize(
     "key",
     spread([key for key in PRIORS if not key.endswith("noise")], (), ["thrust_shape", "voltage"]),
@@ -396,6 +397,7 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
 # ---- A log that its commands do not explain --------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of what no test told
 @pytest.mark.parametrize("seed", spread(range(6), (), [0, 1]))
 def test_a_log_that_has_nothing_to_do_with_its_commands_must_not_be_used(
     seed: int, tmp_path: Path, capsys: Capsys

@@ -72,10 +72,17 @@ class Read:
         return found
 
 
-def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: ColumnNames = ColumnNames()) -> Read:  # noqa: B008 (frozen)
-    """Read the logs of a file. Raises DataFileError, as the command does."""
-    logs = [checked_log(one) for one in read_logs(path, layout, names, axis)]
-    if not any(one.commands for one in logs):
+def read_log(
+    path: Path,
+    layout: Layout,
+    axis: Axis | None = None,
+    names: ColumnNames = ColumnNames(),  # noqa: B008 (frozen)
+    *,
+    is_part: bool = False,
+) -> Read:
+    """Read the logs of a file, or of one file of a dive, which needs no commands. Raises DataFileError."""
+    logs = [checked_log(one) for one in read_logs(path, layout, names, axis, is_part=is_part)]
+    if not is_part and not any(one.commands for one in logs):
         raise DataFileError(f"{path}: no commands of thrusters were found")
     findings = [finding for one in logs for finding in one.findings]
     return Read(logs, [finding for finding in findings if finding.kind != "source"])

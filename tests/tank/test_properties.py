@@ -63,6 +63,7 @@ def test_one_dive_is_read_under_any_name(name: str, tmp_path: Path) -> None:
         assert (row.end - row.start, row.rate) == pytest.approx((9.9, 10.0), abs=1e-3)
 
 
+UNCOMMANDED = ("an export of VideoRay Cockpit", "a log of Water Linked's DVL")
 STRAY = ("a CSV file", "a DataFlash log", "a telemetry log", "a ULog", "an MCAP file")
 """The formats of the default tests: each has a reader of its own, and one stands for all bags."""
 
@@ -73,18 +74,23 @@ STRAY = ("a CSV file", "a DataFlash log", "a telemetry log", "a ULog", "an MCAP 
 def test_in_every_format_a_stray_time_is_left_out_and_a_clock_that_is_set_splits_the_log(
     kind: Format, tmp_path: Path
 ) -> None:
-    """By twelve days, which all clocks can show: one of 32 bits counts milliseconds."""
+    """By twelve days, which all clocks can show: one of 32 bits counts milliseconds. Makers' files lack commands."""
+    has_commands = kind.name not in UNCOMMANDED
     names, _ = names_of(BLUEROV2, RovTables(columns=writers.VARIABLES if kind.name == "a .mat file" else {}))
     days, n = 1e6, np.arange(100)
     stray, later = DIVE.time + days * (n == 60), DIVE.time + days * (n >= 50)
-    read = read_log(SEEDS[kind.name](tmp_path, replace(DIVE, time=stray)), BLUEROV2, names=names)
-    assert read.log.commands
-    assert len(read.log.commands.rows) == 99
+    path = SEEDS[kind.name](tmp_path, replace(DIVE, time=stray))
+    read = read_log(path, BLUEROV2, names=names, is_part=not has_commands)
+    assert bool(read.log.commands) == has_commands
+    assert not read.log.commands or len(read.log.commands.rows) == 99
+    assert read.log.channels
     assert all(channel.count == 99 for channel in read.log.channels)
     assert [finding.kind for finding in read.findings].count("stray times") == 1
     (tmp_path / "set").mkdir()
-    read = read_log(SEEDS[kind.name](tmp_path / "set", replace(DIVE, time=later)), BLUEROV2, names=names)
-    assert [len(log.commands.rows) for log in read.logs if log.commands] == [50, 50]
+    path = SEEDS[kind.name](tmp_path / "set", replace(DIVE, time=later))
+    read = read_log(path, BLUEROV2, names=names, is_part=not has_commands)
+    assert [{channel.count for channel in log.channels} for log in read.logs] == [{50}, {50}]
+    assert [len(log.commands.rows) for log in read.logs if log.commands] == [50, 50][: 2 * has_commands]
     (told,) = (finding for finding in read.findings if finding.kind == "clock restarts")
     assert float(told.words["at"]) == pytest.approx(4.9, abs=1e-2)
 

@@ -121,6 +121,7 @@ def drawn(path: Path, rng: random.Random) -> Vehicle:
     )
 
 
+@pytest.mark.filterwarnings("ignore::rov_fmu.VehicleWarning")  # of a lag with a wide interval
 @often("times", 1, 20, 200)
 def test_every_vehicle_is_read_back_to_the_last_bit(times: int, tmp_path: Path) -> None:
     """From file to vehicle to file to vehicle."""
