@@ -73,6 +73,15 @@ def test_nothing_is_said_about_a_right_log(vehicle: str, tmp_path: Path) -> None
     assert not told(folder_of(tmp_path, ROV.format(vehicle), {"dive.csv": VEHICLES[vehicle]}))
 
 
+def test_a_sensor_that_tells_no_motion_says_nothing(tmp_path: Path) -> None:
+    """A DVL of a vehicle that keeps its depth tells a speed of exactly 0, and no error is left of any signs."""
+    header, *rows = VEHICLES["bluerov2"].splitlines()
+    log = "\n".join(
+        [header.replace("depth [m]", "heave velocity [m/s]"), *(row.rpartition(",")[0] + ",0" for row in rows)]
+    )
+    assert not told(folder_of(tmp_path, ROV.format("bluerov2"), {"dive.csv": log}))
+
+
 @pytest.mark.parametrize("turned", TURNS)
 def test_a_turned_velocity_sensor_is_left_to_the_fit(turned: float, tmp_path: Path) -> None:
     """It finds the angle, and turns the values back."""

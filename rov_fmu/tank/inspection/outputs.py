@@ -234,14 +234,18 @@ class Effects:
         return cls(found / scale[:outputs], clearness, left, right, independent)
 
     def unexplained(self, effects: Array) -> float:
-        """Return the sum of the squared errors where the outputs have effects of these ratios and signs, n."""
+        """Return the sum of the squared errors where the outputs have effects of these ratios and signs, n.
+
+        It has the errors of rounding, which are all that is left of an exact motion, and is 0 only for one that rests.
+        """
         outputs = len(effects)
         sides = np.column_stack([self.right[:, :outputs] @ effects, self.right[:, outputs:]])
         found = np.linalg.lstsq(sides, self.left)[0]
         if found[0] < 0.0:  # the push would act backwards
             sides = sides[:, 1:]
             found = np.linalg.lstsq(sides, self.left)[0]
-        return float(np.sum((self.left - sides @ found) ** 2))
+        rounding = np.finfo(float).eps * self.left @ self.left
+        return float(np.sum((self.left - sides @ found) ** 2) + rounding)
 
     def clear(self, outputs: Iterable[str]) -> Iterator[tuple[str, float]]:
         """Yield the outputs that clearly move the axis, with the accelerations."""

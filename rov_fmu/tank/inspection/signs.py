@@ -73,7 +73,8 @@ def _gain(fits: Sequence[Effects], expected: Array, changed: Array) -> float:
     total = 0.0
     for fit, old, new in zip(fits, expected, changed, strict=True):
         before, after = fit.unexplained(old), fit.unexplained(new)
-        total += fit.independent * (before - after) / min(before, after)
+        if before != after:
+            total += fit.independent * (before - after) / min(before, after)
     return total
 
 
