@@ -7,7 +7,7 @@ and several machines do a part of the blocks each, by Dask or alone, with files 
 import json
 import logging
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
@@ -31,7 +31,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, RovError, StudyError, brief, reason_of, shown
 from rov_fmu.io.numbers import WORKERS
-from rov_fmu.io.output import Output, put_whole
+from rov_fmu.io.output import Output, WriteError, put_whole
 from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.figures import Array, Figures
 from rov_fmu.study.model import read_model, vehicle_model
@@ -139,8 +139,7 @@ def do_study(
     try:
         done = _done(study, missing, workers, scheduler) if missing else iter(())
         first = next(done, None)  # before anything is written or removed, because an FMU may not run at all
-        for other in others:
-            other.unlink()
+        _begin(folder / RUNS, others)
         put_whole(Output(folder / STUDY, json.dumps(_told(study, blocks), indent=2, ensure_ascii=False).encode()))
         for block, content, lost in chain([first] if first else [], done):
             put_whole(Output(folder / RUNS / block.name, content))
@@ -172,6 +171,16 @@ def _others(folder: Path, study: Study, names: Collection[str], *, force: bool) 
     if (strange := [path for path in others if study.digest not in path.name]) and not force:
         raise FileError(f"{strange[0]}: has the rows of another plan or FMU: name another folder, or use --force")
     return others
+
+
+def _begin(folder: Path, others: Iterable[Path]) -> None:
+    """Make the folder of the blocks, and remove those files from it. Raises WriteError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteError(error.errno, error.strerror, str(error.filename or folder)) from error
+    for path in others:
+        path.unlink()
 
 
 def _numbers_of(part: str | None) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pandas as pd
 import pytest
 from distributed import LocalCluster
 
-from rov_fmu import Results, run_study
+from rov_fmu import Results, build_fmu, load, run_study
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import WriteError
@@ -218,6 +219,24 @@ def test_a_folder_of_an_earlier_version_is_refused_in_one_line(
     assert without_progress(capsys.readouterr().err) == f"rov-fmu: {folder / words}\n"
     assert main(["study", str(plan), "-o", str(folder), "--workers", "1", "--force"]) == 0
     assert len(Results(folder).runs) == len([*(folder / "runs").iterdir()]) == 2
+
+
+def test_nothing_is_written_for_an_fmu_that_cannot_run_here(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What another plan did stays, also with --force."""
+    other = "win64" if sys.platform != "win32" else "linux64"
+    build_fmu(load("videoray"), tmp_path / "other.fmu", platforms=[other])
+    plan, folder = tmp_path / "plan.toml", tmp_path / "results"
+    plan.write_text(
+        'fmu = "other.fmu"\nstep = 0.1\nstop_time = 1.0\nruns = 2\n[vary]\nalpha_u = { uniform = [1.0, 2.0] }\n'
+        '[keep]\noutputs = ["u"]\n'
+    )
+    for rows in ((), ("000000000-another-rows.parquet",)):
+        for row in rows:
+            (folder / "runs").mkdir(parents=True)
+            (folder / "runs" / row).write_bytes(b"")
+        assert main(["study", str(plan), "-o", str(folder), "--force"]) == 2
+        assert "other.fmu: cannot be run: " in without_progress(capsys.readouterr().err)
+        assert [one.name for one in folder.rglob("*.*")] == [*rows]
 
 
 def test_what_cannot_be_done_is_a_line(
