@@ -13,7 +13,7 @@ may change with any version.
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 HOMES = {
     name: f"rov_fmu.{module}"
     for module, names in {

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from rov_fmu import __version__
 from rov_fmu.c.compile import BACKENDS, FMI_VERSIONS, INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.interface.export_command import EXPORTS, export
@@ -32,6 +31,7 @@ from rov_fmu.io.messages import (
     shown,
 )
 from rov_fmu.io.numbers import TIME_LIMITS, TOLERANCES, WORKERS, NumberRange
+from rov_fmu.io.program import program
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
@@ -203,13 +203,26 @@ class _Commands(click.Group):
         return sorted(self.commands, key=lambda name: getattr(self.commands[name], "section", 0))
 
 
+def _tell_version(context: click.Context, _: click.Parameter, is_asked: bool) -> None:
+    if is_asked:
+        click.echo(program())
+        context.exit()
+
+
 @click.group(
     cls=_Commands,
     no_args_is_help=False,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-@click.version_option(__version__, prog_name="rov-fmu")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_tell_version,
+    help="Show the version and exit.",
+)
 @click.pass_context
 def _commands(context: click.Context) -> None:
     """Make an FMU of an identified underwater vehicle (ROV).

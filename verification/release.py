@@ -9,6 +9,7 @@ left for a person.
 """
 
 import hashlib
+import re
 import subprocess
 import sys
 import zipfile
@@ -38,6 +39,10 @@ from verification.fresh_environment import environment
 
 _TOOLS = {"native": ("rov-fmu", "ziglang"), "pythonfmu": ("rov-fmu", "pythonfmu")}
 """The packages that make an FMU of each kind, parts of which are in its binaries."""
+
+
+_CODE = ("rov_fmu", "fmu_src", "models", "build_fmu.py", "build_backend.py", "pyproject.toml")
+"""What a release is made of, in a checkout."""
 
 
 def distributions(folder: Path) -> None:
@@ -147,10 +152,45 @@ def obstacles() -> list[str]:
         name, _, wanted = line.partition("==")
         if wanted and (installed := metadata.version(name)) != wanted:
             lines.append(f"{name} {installed} is installed, and constraints.txt has {wanted}: CONTRIBUTING.md, Release")
-    for name, text in (("CHANGELOG.md", f"## [{__version__}] – 2"), ("CITATION.cff", f"\nversion: {__version__}\n")):
-        if text not in (ROOT / name).read_text(encoding="utf-8"):
-            lines.append(f"{name}: must have a line {text.strip()!r}")
+    lines += wrong_headings(__version__, ROOT)
+    changed = subprocess.run(
+        ["git", "status", "--porcelain", "--", *_CODE], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout
+    return [*lines, *(f"{line[3:]}: is not committed" for line in changed.splitlines())]
+
+
+def wrong_headings(version: str, checkout: Path) -> list[str]:
+    """Return a line for each text of a checkout that tells of another version, or of other code than is there.
+
+    The first heading of the changelog decides what a release says. The code must not have changed after its date:
+    otherwise it would get the notes of an earlier state.
+    """
+    if ".dev" in version:
+        return [f"rov_fmu/__init__.py: {version} is in development: set the version of the release"]
+    heading = newest_heading(checkout)
+    if not (dated := re.fullmatch(rf"\[{re.escape(version)}\] – (\d{{4}}-\d\d-\d\d)", heading)):
+        return [f"CHANGELOG.md: the first heading is {heading!r}, and must be '[{version}] – ' with a date"]
+    day, lines = dated[1], list[str]()
+    citation = (checkout / "CITATION.cff").read_text(encoding="utf-8")
+    for text in (f"version: {version}", f'date-released: "{day}"'):
+        if f"\n{text}\n" not in citation:
+            lines.append(f"CITATION.cff: must have a line {text!r}")
+    last = subprocess.run(
+        ["git", "log", "-1", "--format=%cs %h %s", "--", *_CODE],
+        cwd=checkout,
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    if last[:10] > day:
+        lines.append(f"CHANGELOG.md: {heading!r} is older than the code, which changed last by: {last}")
     return lines
+
+
+def newest_heading(checkout: Path) -> str:
+    """Return the first heading of the changelog: "[0.3.0] – 2026-12-31", or "[Unreleased] – 0.3.0"."""
+    text = (checkout / "CHANGELOG.md").read_text(encoding="utf-8")
+    return next(line.removeprefix("## ") for line in text.splitlines() if line.startswith("## "))
 
 
 def other_fmus(wheel: Path, folder: Path) -> list[str]:

@@ -19,7 +19,6 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from rov_fmu import __version__
 from rov_fmu.equation.catalogue import AXES, BODY, BY_VELOCITY, HEAVE, REVERSE, UPWARD, cross_name
 from rov_fmu.equation.forces import (
     COUPLING,
@@ -35,6 +34,7 @@ from rov_fmu.equation.forces import (
 )
 from rov_fmu.equation.parts import FAINT, Thruster, VehicleAxis
 from rov_fmu.io.messages import InputError
+from rov_fmu.io.program import program
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -146,7 +146,7 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
 
 def rendered_model(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
     """Render the template of a vehicle's model, with what the model lacks as comments."""
-    common = {"number": _number, "vector": _vector, "comment": _comment, "version": __version__, "density": DENSITY}
+    common = {"number": _number, "vector": _vector, "comment": _comment, "program": program(), "density": DENSITY}
     folder = Path(__file__).parent / "templates"
     return render(template, folder, vehicle=vehicle, notes=notes, **common, **content)
 

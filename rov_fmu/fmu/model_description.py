@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from rov_fmu import __version__
 from rov_fmu.c.compile import UNITY_FILE
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.dependencies import parameters_of
@@ -10,6 +9,7 @@ from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.card import card_text
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import LOG_CATEGORIES, DeclaredVariable, FmuModel, variables
+from rov_fmu.io.program import program
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -66,7 +66,7 @@ def model_description(
         guid=guid,
         fmi=fmi,
         native=native,
-        version=__version__,
+        program=program(),
         description=description,
         interfaces=interfaces,
         source_files=source_files,

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu import __version__
 from rov_fmu.equation.catalogue import COUPLED_AXES, HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import EVERY_COMMAND, Curve, Part, Range, SourcedVector
@@ -26,6 +25,7 @@ from rov_fmu.identify.result import Identification, IdentifiedCoefficient, Inter
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief
 from rov_fmu.io.numbers import with_interval
+from rov_fmu.io.program import program
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.description import DRAFTED, ROV_FILE
@@ -108,9 +108,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Ident
             }
             estimates[name] = Estimated(error=float(errors[n]) * QUANTILE / NORMAL, correlation=others)
     validity = tests.description.tables.validity
-    made = Provenance(
-        tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.folder.inputs)
-    )
+    made = Provenance(tool=f"{program()} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.folder.inputs))
     vehicle = replace(
         rov,
         **_head(tests),

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from rov_fmu import __version__
 from rov_fmu.io import numbers
 from rov_fmu.io.messages import capitalized
+from rov_fmu.io.program import program
 from rov_fmu.io.templates import render
 from rov_fmu.report import console
 from rov_fmu.report.palette import PALETTE
@@ -56,7 +56,7 @@ def page(template: str, **content: object) -> str:
         template,
         _TEMPLATES,
         made=today(),
-        version=__version__,
+        program=program(),
         number=number,
         text=number_text,
         unit=pretty_unit,

@@ -22,7 +22,6 @@ import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, w
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from rov_fmu import __version__
 from rov_fmu.c.simulation import reasons, simulate, usable_cores
 from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import LoadError, RunError
@@ -32,6 +31,7 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, RovError, StudyError, brief, reason_of, shown
 from rov_fmu.io.numbers import WORKERS
 from rov_fmu.io.output import Output, WriteError, put_whole
+from rov_fmu.io.program import program
 from rov_fmu.report.progress import StudyProgress
 from rov_fmu.study.figures import Array, Figures
 from rov_fmu.study.model import read_model, vehicle_model
@@ -208,7 +208,7 @@ def _told(study: Study, blocks: Sequence[Block]) -> dict[str, Any]:
     caution = study.model.vehicle.caution if study.model.vehicle else ""
     told = {name: has[name] for name in (*study.varied, *study.recorded)}
     return {
-        "made_by": f"rov-fmu {__version__}",
+        "made_by": program(),
         "title": plan.title,
         "model": study.model.name,
         "plan": plan.model_dump(mode="json", by_alias=True, exclude_none=True),

@@ -339,11 +339,15 @@ def test_tables_that_follow_from_the_code_are_as_it_has_them() -> None:
 
 
 def test_version_is_that_of_the_package() -> None:
+    """A state in development names the release that it becomes, and is cited as the one before."""
+    newest, *older = re.findall(r"^## (.*)$", CHANGELOG.read_text(encoding="utf-8"), re.MULTILINE)
+    coming, dot, _ = __version__.partition(".dev")
+    released = older[0] if dot else newest
+    assert newest.startswith(f"[Unreleased] – {coming}" if dot else f"[{coming}] – ")
+    cited = re.fullmatch(r"\[(.*)\] – (\d{4}-\d\d-\d\d)", released)
+    assert cited
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"\nversion: {__version__}\n" in citation
-    newest = re.findall(r"^## (.*)$", CHANGELOG.read_text(encoding="utf-8"), re.MULTILINE)[0]
-    dated = re.fullmatch(rf"\[{__version__}\] – (\d{{4}}-\d\d-\d\d)", newest)
-    assert newest == f"[Unreleased] – {__version__}" or (dated and f'\ndate-released: "{dated[1]}"\n' in citation)
+    assert f'\nversion: {cited[1]}\ndate-released: "{cited[2]}"\n' in citation
 
 
 def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() -> None:

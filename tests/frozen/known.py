@@ -55,7 +55,7 @@ LOGS = HERE / "logs"
 _IDENTIFY = "identify {f} -o {f}.toml --report {f}.html"
 _VARIES = re.compile(
     r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?'
-    r"|(?<=rov-fmu )\d+\.\d+\.\d+|\b[0-9a-f]{64}\b"
+    r"|(?<=rov-fmu )\d+\.\d+\.\d+(?:\.dev\d+\+[0-9a-f]+)?|\b[0-9a-f]{64}\b"
 )
 """What changes with every version or with a source, although nothing else does."""
 

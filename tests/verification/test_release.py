@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import zipfile
@@ -85,3 +86,34 @@ def test_two_builds_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Monk
         *first.glob("*.tar.gz"),
     ]
     subprocess.run(twine, check=True)  # the long description renders
+
+
+def committed(folder: Path, name: str, text: str, day: str) -> None:
+    """Write a file of a checkout, and commit it on a day."""
+    path = folder / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    now = {"GIT_AUTHOR_DATE": f"{day}T12:00:00Z", "GIT_COMMITTER_DATE": f"{day}T12:00:00Z"}
+    who = {f"GIT_{role}_{key}": "someone" for role in ("AUTHOR", "COMMITTER") for key in ("NAME", "EMAIL")}
+    for words in (["add", "."], ["commit", "-qm", name]):
+        subprocess.run(["git", *words], cwd=folder, check=True, env={**os.environ, **now, **who})
+
+
+def test_a_release_has_the_notes_of_its_own_code(tmp_path: Path) -> None:
+    """The first heading decides, and code that changed after its date would be released with the notes of before."""
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    committed(tmp_path, "rov_fmu/code.py", "first", "2030-01-01")
+    committed(tmp_path, "CHANGELOG.md", "## [0.3.0] – 2030-01-01\n\n## [0.2.0] – 2029-01-01\n", "2030-01-02")
+    committed(tmp_path, "CITATION.cff", 'a: b\nversion: 0.3.0\ndate-released: "2030-01-01"\n', "2030-01-02")
+    assert release.wrong_headings("0.3.0", tmp_path) == []
+    (line,) = release.wrong_headings("0.2.0", tmp_path)
+    assert line.startswith("CHANGELOG.md: the first heading is '[0.3.0] – 2030-01-01', and must be '[0.2.0] – '")
+    (line,) = release.wrong_headings("0.3.0.dev0", tmp_path)
+    assert "0.3.0.dev0 is in development" in line
+    committed(tmp_path, "rov_fmu/code.py", "second", "2030-01-03")
+    (line,) = release.wrong_headings("0.3.0", tmp_path)
+    assert "'[0.3.0] – 2030-01-01' is older than the code, which changed last by: 2030-01-03" in line
+    committed(tmp_path, "CHANGELOG.md", "# Changelog\n\n## [0.3.0] – 2030-01-03\n", "2030-01-03")
+    assert release.wrong_headings("0.3.0", tmp_path) == [
+        "CITATION.cff: must have a line 'date-released: \"2030-01-03\"'"
+    ]
