@@ -190,7 +190,8 @@ class _Parser:
                     call = _call, Path.cwd(), function, path, arguments, options
                     return child.call("call", *call, limits=left)
                 finally:
-                    self.spent[key] = self.spent.get(key, 0.0) + child.clock() - begin
+                    # The system tells the waiting late, so that a short call may seem to end before it began.
+                    self.spent[key] = self.spent.get(key, 0.0) + max(child.clock() - begin, 0.0)
             except ChildError as error:
                 self.close()
                 if isinstance(error, LimitError):
