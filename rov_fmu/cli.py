@@ -324,13 +324,14 @@ def _list(folder: Path) -> None:
     Each file is listed with what it is for. The default is the current folder.
     """
     from rov_fmu.bridges.system.system_command import companions
-    from rov_fmu.io.file_kinds import kind_of, use_of
+    from rov_fmu.io.file_kinds import LOG, kind_of, use_of
     from rov_fmu.io.toml_file import read_toml
     from rov_fmu.report.console import console, print_table, table
+    from rov_fmu.tank.readers.parsers import TABLE, format_of
     from rov_fmu.vehicle.vehicle import load_vehicle
 
     if not folder.is_dir():
-        raise FileError(f"{folder}: must be a folder")
+        raise FileError(f"{folder}: must be a folder; `rov-fmu inspect` lists what a log contains")
     files: list[tuple[str, ...]] = []
     for path in sorted(folder.iterdir()):
         keys: Iterable[str] = ()
@@ -339,6 +340,10 @@ def _list(folder: Path) -> None:
                 keys = read_toml(path, FileError)
         if path.is_file() and (kind := kind_of(path, keys)):
             files.append((one_line(path.name), kind, use_of(kind)))
+        elif path.is_file():  # a maker's tool may have given any suffix to a log
+            with suppress(FileError):
+                if (found := format_of(path)) is not TABLE:
+                    files.append((one_line(path.name), found.name, use_of(LOG)))
     vehicles = [(name, load_vehicle(path).description) for name, path in SHIPPED.items()]
     for titles, rows in {
         ("VEHICLE", "what it is"): vehicles,

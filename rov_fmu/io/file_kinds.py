@@ -9,7 +9,7 @@ VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (T
 GAZEBO_MODEL = "a model for Gazebo (SDF)"
 SYSTEM, SYSTEM_PLAN = "a system (SSP)", "the plan of a system (TOML)"
 TESTS, TESTS_FILE = "a log, or a folder of tank tests", "the rov.toml of a folder of tank tests"
-_TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot, of ROS or of MATLAB"
+LOG, _TOML, _TABLE = "the log of an autopilot, of ROS or of MATLAB", "a TOML file", "a recording or a table (CSV)"
 DATAFLASH_SUFFIX = ".bin"
 """The suffix of a DataFlash log, which the autopilot writes."""
 MAVLINK_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog")
@@ -36,7 +36,7 @@ _WRITTEN = {
 _BY_SUFFIX = {
     **_OWN,
     **dict.fromkeys((".csv", ".tsv"), _TABLE),
-    **dict.fromkeys((*LOG_SUFFIXES, ".mat"), _LOG),
+    **dict.fromkeys((*LOG_SUFFIXES, ".mat"), LOG),
 }
 _BY_KEY = {
     **dict.fromkeys(("component", "connect"), SYSTEM_PLAN),
@@ -56,7 +56,7 @@ _HINTS = {
     TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
     _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
     **dict.fromkeys(
-        (_TABLE, _LOG), "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it"
+        (_TABLE, LOG), "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it"
     ),
 }
 

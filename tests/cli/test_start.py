@@ -123,6 +123,8 @@ def test_list_has_vehicles_and_companions_and_says_what_the_files_of_a_folder_ar
 ) -> None:
     for name in ("dive.bin", "my.fmu", "notes.txt"):
         (tmp_path / name).touch()
+    (tmp_path / "prose.log").write_text("one, two\n1, 2\n")
+    (tmp_path / "vr.txt").write_text("$PVRND,09/14/2026,10:08:02.0,6.0,0.0,0.3,-0.2*6B\n")
     (tmp_path / "plan.toml").write_text("stop_time = 1.0\n")
     (tmp_path / "rov.toml").write_text("[[thruster]]\n")
     (tmp_path / "broken.toml").write_text("[")
@@ -140,10 +142,12 @@ def test_list_has_vehicles_and_companions_and_says_what_the_files_of_a_folder_ar
         "my.fmu": "an FMU",
         "plan.toml": "the plan of a study (TOML)",
         "rov.toml": "the rov.toml of a folder of tank tests",
+        "vr.txt": "an export of VideoRay Cockpit",
     }
+    assert "`rov-fmu inspect` lists what it contains" in rows["vr.txt"]
     assert "`rov-fmu study` carries it out" in rows["plan.toml"]
     assert main(["list", str(tmp_path / "notes.txt")]) == 2
-    assert "must be a folder" in capsys.readouterr().err
+    assert "must be a folder; `rov-fmu inspect` lists what a log contains" in capsys.readouterr().err
 
 
 # ---- Completion ------------------------------------------------------------------------------------------------------
