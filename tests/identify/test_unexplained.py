@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.filter import FilterRun
 from rov_fmu.identify.likelihood.fit import fit_all
@@ -130,6 +130,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
         ("slow velocity", HEAVE): (0.0, 0.05, "m/s"),
         ("slow force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
     }
+    fell = dict[tuple[str, Axis | None], float]()
     for key, (size, usual, unit) in sizes.items():
         process = found[key]
         assert (process.value, process.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
@@ -141,9 +142,11 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
             objective.value(other, objective.runs(other, runs)) - objective.prior(other) for other in (gone, z)
         ]
         before = explained[0] - explained[1] + 2.0 * np.log(posterior.errors[index] / objective.deviation[index])
-        assert process.evidence <= before + 1e-6, "the other parameters are fitted again"
+        assert process.evidence <= before + 1e-8 * abs(before), "the fit chooses steps of its own, which round otherwise"
+        fell[key] = before - process.evidence
         if before <= KEPT:
             assert process.evidence == pytest.approx(before), key
+    assert fell["slow gain", None] > 1.0, "the other parameters are fitted again"
 
 
 @pytest.mark.long
