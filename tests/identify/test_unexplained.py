@@ -142,7 +142,9 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
             objective.value(other, objective.runs(other, runs)) - objective.prior(other) for other in (gone, z)
         ]
         before = explained[0] - explained[1] + 2.0 * np.log(posterior.errors[index] / objective.deviation[index])
-        assert process.evidence <= before + 1e-8 * abs(before), "the fit chooses steps of its own, which round otherwise"
+        assert process.evidence <= before + 1e-8 * abs(before), (
+            "the fit chooses steps of its own, which round otherwise"
+        )
         fell[key] = before - process.evidence
         if before <= KEPT:
             assert process.evidence == pytest.approx(before), key

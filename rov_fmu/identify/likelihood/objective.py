@@ -139,20 +139,17 @@ class Data:
         keys = ("innovations", "variances", "slopes", "log_slopes")
         return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
 
-    def leading(self, scale: Array) -> int | None:
-        """Return the parameter that changes most along a direction (p numbers); None if none of these data does."""
-        most = max(self.indices, key=lambda k: abs(scale[k]), default=None)
-        return most if most is not None and scale[most] else None
+    def leading(self, scales: Array) -> dict[int, int]:
+        """Return the parameters that lead the directions that change these data, with the numbers of these."""
+        return leading(np.where(np.isin(np.arange(self.parameters), self.indices), scales, 0.0))
 
-    def separate(self, scale: Array) -> None:
-        """Replace the derivatives of the leading parameter, which are with respect to a direction, by its own."""
-        leading = self.leading(scale)
-        if leading is None:
-            return
-        column, share = self.indices.index(leading), scale[[*self.indices]] / scale[leading]
-        share[column] = 0.0
-        for slopes in (self.slopes, self.log_slopes):
-            slopes[:, column] -= slopes @ share
+    def separate(self, scales: Array) -> None:
+        """Replace the derivatives of the leading parameters, which are with respect to directions, by their own."""
+        for first, n in self.leading(scales).items():
+            column, share = self.indices.index(first), scales[n, [*self.indices]] / scales[n, first]
+            share[column] = 0.0
+            for slopes in (self.slopes, self.log_slopes):
+                slopes[:, column] -= slopes @ share
 
     @property
     def normalised(self) -> Array:
@@ -191,6 +188,15 @@ def derivatives(function: Callable[[Array], Array], z: Array, indices: Sequence[
     moves = [(k, sign * step) for k, step in zip(indices, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
     found = function(changed(z, moves))
     return (found[:, ::2] - found[:, 1::2]) / (2.0 * steps)
+
+
+def leading(directions: Array) -> dict[int, int]:
+    """Return the coordinates that lead some directions (k x p), with the numbers of these.
+
+    That is the one that changes most of those that no other direction changes. A direction without any is left out.
+    """
+    own = np.where(np.count_nonzero(directions, axis=0) == 1, np.abs(directions), 0.0)
+    return {int(np.argmax(sizes)): n for n, sizes in enumerate(own) if sizes.any()}
 
 
 def cost(innovations: Array, variances: Array) -> float:
@@ -421,13 +427,13 @@ class Objective:
 
         Exact ones are differences to both sides, and the others, which guide the steps of a fit, to one side. Those
         with respect to the noise are of earlier data, if these are given. All contain the changes of the gains of the
-        filter. Without these, the common scale of all forces, which the motion does not tell, would look determined,
-        and where the model does not explain a log, half of a gradient would have the wrong sign.
+        filter. Without these, the scales of forces that the motion does not tell would look determined, and where the
+        model does not explain a log, half of a gradient would have the wrong sign.
 
-        This scale would also look determined by the errors of differences, which are large at a kink of the motion.
-        One of its parameters therefore moves together with all others, and its own derivatives are what is left.
+        A scale would also look determined by the errors of differences, which are large at a kink of the motion. One of
+        its parameters therefore moves together with all others, and its own derivatives are what is left.
         """
-        parameters, scale = self.table.parameters, self.table.scale_of_forces(z)
+        parameters, scales = self.table.parameters, self.table.scales_of_forces(z)
         found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
             indices = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
@@ -441,10 +447,10 @@ class Objective:
                     found[n].log_slopes[:, column] = of_noise[n].log_slopes[:, column]
             for first in range(0, len(columns), _TOGETHER):
                 some = columns[first : first + _TOGETHER]
-                work.append(partial(self.differentiate, z, n, some, run, found[n], scale, exact=exact))
+                work.append(partial(self.differentiate, z, n, some, run, found[n], scales, exact=exact))
         in_threads(work)
         for data in found:
-            data.separate(scale)
+            data.separate(scales)
         if self.rows:
             found.append(self._rows_data(z))
         return found
@@ -456,23 +462,24 @@ class Objective:
         columns: Sequence[int],
         run: FilterRun,
         into: Data,
-        scale: Array,
+        scales: Array,
         *,
         exact: bool,
     ) -> None:
         """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
         The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
-        sides. Those of the leading parameter of a common scale are with respect to this scale.
+        sides. Those of the leading parameter of a scale of forces are with respect to this scale.
         """
         parameters = [self.table.parameters[into.indices[column]] for column in columns]
         moves = [(into.indices[c], own.step_at(z[into.indices[c]])) for c, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        moved, leading = changed(z, moves), into.leading(scale)
+        moved, led = changed(z, moves), into.leading(scales)
         for column, (k, step) in enumerate(moves):
-            if k == leading:
-                moved[:, column] = z + step * scale / scale[k]
+            if k in led:
+                along = np.eye(len(scales))[led[k]] * step / scales[led[k], k]
+                moved[:, column] = self.table.with_scales(z, along)
         sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
         for column, (k, step) in zip(columns, moves, strict=False):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import GEOMETRY, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import COUPLED_AXES, GEOMETRY, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import FAINT, Curve, Part, SourcedVector, Thruster
 from rov_fmu.identify.likelihood.curves import Drags, Quadratic, nearest_drag
@@ -170,11 +170,51 @@ class Table:
         """Return a number of each parameter, such as its `mean`, or `of_kind.is_size`."""
         return np.array([*map(attrgetter(key), self.parameters)])
 
-    def scale_of_forces(self, z: Array) -> Array:
-        """Return the direction, p, along which thrust, drag, load and inertia grow alike. The motion stays the same."""
-        power = self.each("of_kind.force_power")
-        from_null = z - np.array([p.null or 0.0 for p in self.parameters])
-        return np.where(self.each("is_log"), power, power * from_null)
+    def scales_of_forces(self, z: Array) -> Array:
+        """Return the directions along which the motion stays the same, k x p.
+
+        Along one of them, thrust, drag, load and inertia grow alike, of axes that share no thruster with others. Along
+        another one, a curve has more thrust, and its thrusters have less strength.
+        """
+        return np.where(self.each("is_log"), 1.0, self._scaled(z)) * self._powers_of_scales
+
+    def with_scales(self, z: Array, changes: Array) -> Array:
+        """Return the coordinates after changes of the logarithms of k scales of forces."""
+        powers = changes @ self._powers_of_scales
+        return np.asarray(z + np.where(self.each("is_log"), powers, np.expm1(powers) * self._scaled(z)))
+
+    def _scaled(self, z: Array) -> Array:
+        """Return what is proportional to a force of each coordinate that is no logarithm."""
+        return z - np.array([0.0 if p.kind == STRENGTH else p.null or 0.0 for p in self.parameters])
+
+    @cached_property
+    def _powers_of_scales(self) -> Array:
+        """The powers of the scales of forces to which each number is proportional, k x p."""
+        power, of = self.each("of_kind.force_power"), [p.of for p in self.parameters]
+        groups, curves = list[tuple[set[str], set[int]]](), dict[int, list[int]]()
+        for axis in self.layout.bare_axes:
+            names, gains = {axis.name}, set[int]()
+            if self.layout.coupled and axis in COUPLED_AXES:
+                names |= {one.name for one in COUPLED_AXES}
+            for t in self.layout.thrusters_along(axis):
+                strength, scale = self.index(STRENGTH, t.name), self.index("thrust scale", self.shared(t.curve))
+                if strength is not None and not self.parameters[strength].is_fixed:
+                    gains.add(strength)
+                    if scale is not None:
+                        curves.setdefault(scale, []).append(strength)
+                elif scale is not None:
+                    gains.add(scale)
+            linked = [one for one in groups if one[0] & names or one[1] & gains]
+            names, gains = names.union(*(one[0] for one in linked)), gains.union(*(one[1] for one in linked))
+            groups = [*(one for one in groups if one not in linked), (names, gains)]
+        rows = [np.where([name in names for name in of], power, 0.0) for names, _ in groups]
+        for row, (_, gains) in zip(rows, groups, strict=True):
+            row[[*gains]] = 1.0
+        for scale, strengths in curves.items():
+            row = np.zeros(len(of))
+            row[scale], row[strengths] = 1.0, -1.0
+            rows.append(row)
+        return np.array(rows).reshape(-1, len(of))
 
     def index(self, kind: str, of: str = "", part: str = "") -> int | None:
         """Return the index of a parameter, or None."""

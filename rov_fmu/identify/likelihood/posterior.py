@@ -13,7 +13,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.kinds import INERTIA
-from rov_fmu.identify.likelihood.objective import derivatives
+from rov_fmu.identify.likelihood.objective import derivatives, leading
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.result import CONSTANTS, Interval
 from rov_fmu.tank.arrays import Array
@@ -43,15 +43,13 @@ class Posterior:
     def of(cls, table: Table, z: Array, information: Array, absent: Collection[int] = ()) -> "Posterior":
         """Return the posterior for the second derivatives of J.
 
-        The common scale of all forces, of which the motion tells nothing, is a coordinate of its own in place of one of
-        its parameters. What the priors tell of it would be lost in rounding beside what exact data tell of each.
+        Scales of forces, of which the motion tells nothing, are coordinates of their own in place of one of their
+        parameters. What the priors tell of them would be lost in rounding beside what exact data tell of each.
         """
         free = [n for n, p in enumerate(table.parameters) if n not in absent and not p.is_fixed]
-        forces = table.scale_of_forces(z)[free]
-        basis = np.eye(len(free))
-        if forces.any():
-            most = np.argmax(np.abs(forces))
-            basis[:, most] = forces / forces[most]
+        basis, scales = np.eye(len(free)), table.scales_of_forces(z)[:, free]
+        for column, n in leading(scales).items():
+            basis[:, column] = scales[n] / scales[n, column]
         H = basis.T @ information[np.ix_(free, free)] @ basis / 2.0
         sizes = np.sqrt(np.diag(H))  # parameters differ by many orders of magnitude
         values, vectors = np.linalg.eigh(H / np.outer(sizes, sizes))

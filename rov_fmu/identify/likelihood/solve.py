@@ -367,17 +367,17 @@ def best_explanations(evidence: Mapping[_Key, float]) -> list[_Key]:
 
 
 def scaled(objective: Objective, z: Array) -> Array:
-    """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
+    """Return the parameters with the scales of thrust, drag, load and inertia that their priors prefer.
 
-    Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
-    The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
+    Motion does not tell these scales, and steps of the fit, which are short where the data have kinks, hardly move
+    them. The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scales.
     """
-    direction = objective.table.scale_of_forces(z)
-    if not direction.any():
+    directions = objective.table.scales_of_forces(z)
+    if not directions.any():
         return z
-    weight = direction / objective.deviation**2
-    change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
-    moved = z + direction * np.where(objective.table.each("is_log"), change, np.expm1(change))
+    weighted = directions / objective.deviation
+    changes = np.linalg.lstsq(weighted.T, (objective.mean - z) / objective.deviation, rcond=None)[0]
+    moved = objective.table.with_scales(z, changes)
     moved = np.clip(moved, objective.low, objective.high)
     with suppress(DivergedError):
         before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))

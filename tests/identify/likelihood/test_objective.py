@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
@@ -88,7 +89,7 @@ def names(parameters: Sequence[Parameter]) -> list[str]:
     return [" ".join(filter(None, (p.kind, p.of, p.part))) for p in parameters]
 
 
-def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
+def test_no_error_of_a_derivative_tells_a_scale_of_forces(
     objective: Objective, point: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The motion does not depend on it, and derivatives lose much at a kink. Here, their steps are far too long.
@@ -97,11 +98,12 @@ def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
     """
     monkeypatch.setattr(parameters, "_MOTION_STEP", 0.03)
     logs = objective.of(DataPart(range(len(objective.logs)), []))
-    scale = objective.table.scale_of_forces(point)
-    for is_exact in (True, False):
+    scales = objective.table.scales_of_forces(point)
+    assert len(scales) > 1
+    for is_exact, scale in product((True, False), scales):
         for data in logs.data(point, logs.runs(point), exact=is_exact):
             along = np.linalg.norm(data.slopes @ scale[[*data.indices]])
-            assert along < 1e-4 * np.linalg.norm(data.slopes * scale[[*data.indices]])
+            assert along <= 1e-2 * np.linalg.norm(data.slopes * scale[[*data.indices]])
 
 
 def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
