@@ -188,9 +188,8 @@ def _axis(
 
 
 def _axis_of(slip: Slip) -> Axis | None:
-    """Return the axis that a mistake in a log concerns; None if it is none of a single quantity."""
-    quantity = QUANTITIES.get(slip.quantity)
-    return quantity.axis if quantity else None
+    """Return the axis that a mistake in a log concerns; None if its quantity moves along none."""
+    return QUANTITIES[slip.quantity].axis
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:

@@ -217,13 +217,6 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
-        "reversed commands",
-        quiet(structures=(Structure("reversed commands", "l", 0.97),)),
-        "(probability 97% among",
-        quiet(),
-    ),
-    ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
-    (
         "turned round",
         quiet(structures=(Structure("turned round", "5 and 6", 0.97),)),
         "thrusters 5 and 6: they work astern where rov.toml says ahead",

@@ -23,8 +23,6 @@ from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN
@@ -142,20 +140,12 @@ QUESTIONS = {
 def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]:
     """Return what is asked about the first 30 s of some logs, by file and quantity. Forces replace a base."""
     some = [replace(r, **{key: getattr(r, key)[:150] for key in ("time", "command", "values")}) for r in logs]
-    return asked_of(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
-
-
-def asked_of(folder: Path, *, may_be_thrusters: bool = False) -> dict[tuple[str, str], str]:
-    """Return what is asked about the files of a folder, by file and quantity.
-
-    `may_be_thrusters` is True where wrong signs of thrusters, which the data tell apart, may explain the logs as well.
-    """
-    tests = load_tests(folder)
+    tests = load_tests(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
     known, recorded, rows = begin(tests)
     objective = Objective.of_known(known, recorded, rows)
     found, left = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf), {}, {})
     assert all(one.evidence > KEPT for one in found)
-    assert (left == np.inf if may_be_thrusters else left < ALARM) or not found, "the mended logs agree"
+    assert left < ALARM or not found, "the mended logs agree"
     return {(one.file, one.quantity): one.words for one in found}
 
 
@@ -280,27 +270,6 @@ def mirrored(folder: Path, *columns: str) -> Path:
             row[index] = str(-float(row[index])) if row[index] else ""
     file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
     return file
-
-
-@pytest.mark.parametrize(("yaw", "is_tried"), [({-1.0: 1.0}, True), ({}, True), ({1.0: 1.0}, False)])
-def test_a_frame_is_tried_only_where_no_channel_agrees_as_it_stands(yaw: dict[float, float], is_tried: bool) -> None:
-    """The depth has the other sign, as where both vertical thrusters are reversed. The fit of a frame takes long."""
-    ratios = {"depth": {-1.0: 1.0}, "heading": {}, "yaw velocity": yaw}
-    channels = {name: Channel(QUANTITIES[name], Source("log"), np.zeros(0), np.zeros(0)) for name in ratios}
-    some = [module._Match("dive.csv", channels[name], 10, own) for name, own in ratios.items()]
-    assert [*module._frames(some)] == [frozenset((one, -1.0) for one in some)] * (2 * is_tried)
-
-
-@pytest.mark.long
-def test_a_mirrored_frame_is_one_question(tmp_path: Path) -> None:
-    """Depth and heading are wrong together, as in a frame that is up and to port. The velocity ahead is right."""
-    file = mirrored(tmp_path, "depth [m]", "heading [deg]")
-    for other in {*tmp_path.glob("*.csv")} - {file}:
-        other.unlink()
-    file.write_text("\n".join(file.read_text(encoding="utf-8").splitlines()[:401]), encoding="utf-8")  # 20 s are enough
-    ((of, words),) = asked_of(tmp_path, may_be_thrusters=True).items()
-    assert of == (file.name, "frame")
-    assert "north-east-down" in words
 
 
 @pytest.mark.weekly

@@ -7,7 +7,6 @@ the filter reads of the logs: which commands act, and what lies between them.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import combinations
 from math import inf, pi, radians
 
 import numpy as np
@@ -104,23 +103,6 @@ def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior
     return known, found
 
 
-def _permuted(permutation: Callable[[Of], tuple[Of, float]]) -> Change:
-    """Return the change of the commands of some thrusters to those of others, with a sign."""
-
-    def change(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-        others, sign = permutation(of)
-        found = []
-        for sampled in logs:
-            inputs, names = sampled.record.inputs.copy(), [*sampled.layout.inputs]
-            for thruster, other in zip(of, others, strict=True):
-                if {f"u_{thruster}", f"u_{other}"} <= {*names}:
-                    inputs[:, names.index(f"u_{thruster}")] = sign * sampled.record.inputs[:, names.index(f"u_{other}")]
-            found.append(sampled.with_inputs(inputs))
-        return known, found
-
-    return change
-
-
 def _of_layout(changed: Callable[[Layout, Of], Layout]) -> Change:
     """Return the change of the structure of the vehicle, in all logs."""
 
@@ -139,7 +121,9 @@ def _turned_round(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior
     def opposite(layout: Layout, of: Of) -> Layout:
         return replace(layout, thrusters=tuple(t.opposite if t.name in of else t for t in layout.thrusters))
 
-    return _of_layout(opposite)(*_permuted(lambda of: (of, -1.0))(known, logs, of, start), of, start)
+    signs = ([-1.0 if name in {f"u_{one}" for one in of} else 1.0 for name in log.layout.inputs] for log in logs)
+    changed = [log.with_inputs(log.record.inputs * own) for log, own in zip(logs, signs, strict=True)]
+    return _of_layout(opposite)(known, changed, of, start)
 
 
 def _with_rotors(layout: Layout, _: Of) -> Layout:
@@ -243,11 +227,6 @@ def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
     return {"of": listed(words)}
 
 
-def _of_twins(known: Prior, logs: Logs, of: Of, _: Start) -> dict[str, str]:
-    """Return the thrusters that no log tells apart, of which one has it."""
-    return {"of": listed(twins(known, logs, *of), "or")}
-
-
 def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that the logs command, one of those that no log tells apart."""
     for group in thrusters_alike(known.layout, [*map(dive_commands, logs)]):
@@ -290,20 +269,6 @@ def thrusters_alike(layout: Layout, commands: Sequence[Mapping[str, Array]]) -> 
             signature = np.outer(np.round(np.multiply(effects, sign), 9), sign * values) + 0.0  # no -0
             shown.append((signature.tobytes(), thruster.name))
     return [tuple(names) for names in grouped(shown).values()]
-
-
-def twins(known: Prior, logs: Logs, name: str) -> Of:
-    """Return the thrusters that no log tells from one of them, with its name."""
-    groups = thrusters_alike(known.layout, [*map(dive_commands, logs)])
-    return next((group for group in groups if name in group), ())
-
-
-def _pairs(known: Prior, logs: Logs) -> Iterator[Of]:
-    alone = [of[0] for of in _thrusters(known, logs)]
-    for pair in combinations(alone, 2):
-        commands = [[dive_commands(one).get(name, np.zeros(1)) for name in pair] for one in logs]
-        if not all(np.array_equal(first, second) for first, second in commands):
-            yield pair
 
 
 def _commanded(known: Prior, logs: Logs) -> Iterator[Of]:
@@ -368,26 +333,6 @@ HYPOTHESES = {
             "Munk forces{odds}. The vehicle file says so by coupling = true"
         ),
         # no null: these forces follow from the mass and the inertia, and nothing makes them smaller
-    ),
-    "reversed commands": Hypothesis(
-        0.03,
-        _thrusters,
-        _permuted(lambda of: (of, -1.0)),
-        sentence=(
-            "thruster {of}: it pushes against its commands in the logs{odds}. Check its direction, the order of its "
-            "wires, and its propeller"
-        ),
-        in_words=_of_twins,
-        is_contrast=True,
-        # no null: a thruster pushes ahead or astern, and nothing lies between
-    ),
-    "swapped commands": Hypothesis(
-        0.03,
-        _pairs,
-        _permuted(lambda of: (of[::-1], 1.0)),
-        sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
-        is_contrast=True,
-        # no null: two commands are swapped or not, and nothing lies between
     ),
     "turned round": Hypothesis(
         0.05,

@@ -12,10 +12,6 @@ Added mass is never negative, so an inertia below the vehicle's own is as unlike
 distance, squared in standard errors, is subtracted here: it shows knots, which are 1.94 times as many as m/s. So is
 the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
-A frame forward, to starboard, down that is read as one forward, to port, up changes the signs of several channels of a
-source together, and so does the other way round. With north-east-down read as east-north-up, headings and positions are
-the mirror image of the true ones, and where north is does not matter here. So the frame of a source is a scaling, too.
-
 Only few scalings are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
 only a channel that would agree with this motion for another k, but not for 1, is suspected. The priors do not tell
 knots and feet from metres. These are suspected where the inertia is too small, or where two channels of an axis differ
@@ -28,11 +24,11 @@ from math import hypot, inf, log, pi
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, SWAY, YAW, Axis
+from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
-from rov_fmu.identify.likelihood.hypotheses import Starts, apart, applied
+from rov_fmu.identify.likelihood.hypotheses import Starts, applied
 from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
@@ -50,9 +46,7 @@ from rov_fmu.identify.likelihood.solve import (
     start_of,
 )
 from rov_fmu.identify.result import KEPT, Slip
-from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.inspection.signs import FRAME
 from rov_fmu.tank.log import Channel
 
 _CERTAIN, _WEIGHED = 2.0, 0.05
@@ -67,8 +61,6 @@ _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
 _KNOTS, _FEET = 3600.0 / 1852.0, 1.0 / 0.3048
 _CUSTOMARY = {_KNOTS: "in knots", _FEET: "in {}"}
 """What the scales of other units of length and speed mean; `{}` is the unit with feet."""
-_MIRRORED = (SWAY, HEAVE, PITCH, YAW)
-"""The axes along which a motion has the other sign in a frame forward, to port, up."""
 _SAME = 0.15
 """The largest logarithm of the ratio of two channels to that of their units."""
 _NEAR = 0.5 * log(10.0)
@@ -127,8 +119,6 @@ def slips(
 ) -> tuple[tuple[Slip, ...], float]:
     """Return the mistakes that explain the logs much better, and the error R that the best leaves along its axes.
 
-    R is infinite where reversed or swapped commands of thrusters that the data tell apart may explain a sign as well.
-
     `best` is where J is least for the files as they stand, `errors` are the standard errors there, and `starts` has the
     hypotheses about the structure that won. Where several explanations are about as good, each is told for its files.
     `made` keeps the fits of scaled channels, which do not depend on `best`, for a call with the same hypotheses.
@@ -138,8 +128,7 @@ def slips(
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
-    frames = {*_frames(compared)}
-    untried, as_it_is = {*_scalings(suspected), *frames}, frozenset[tuple[_Match, float]]()
+    untried, as_it_is = {*_scalings(suspected)}, frozenset[tuple[_Match, float]]()
     if not untried:
         return (), inf
     fits, found = dict[Scaling, tuple[Objective, Minimum]](), dict[Scaling, float]()
@@ -176,7 +165,7 @@ def slips(
         found |= {one: fit(one) for one in untried}
         found |= {one: fit(one) for one in untried if is_close(found[one])}
         first = max(filter(None, found), key=lambda one: found[one])
-        fewer = {first - {member} for member in first} if first not in frames and is_close(found[first]) else set()
+        fewer = {first - {member} for member in first} if is_close(found[first]) else set()
         untried = fewer - found.keys()
     if is_close(found[first]) and is_close(found[as_it_is]):
         found[as_it_is] = fit(as_it_is)
@@ -185,18 +174,12 @@ def slips(
     for scaling in best_explanations(gains):
         for match, scale in scaling:
             name, question = match.channel.quantity.name, _words(match.channel, scale)
-            if scaling in frames:
-                name, question = _frame_in_words(scaling)
             told.setdefault((match.file, name), {}).setdefault(question, gains[scaling])
     mistakes = (
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
     )
-    layout = objective.table.layout
-    axes = {axis for one, scale in first if scale < 0.0 and (axis := one.axis)}
-    drivers = {thruster.name for axis in axes for thruster in layout.thrusters_along(axis)}
-    is_told = first in fits and not (drivers and any(map(apart(objective, best).get, drivers)))
-    if not is_told:
+    if first not in fits:
         return tuple(mistakes), inf
     concerned = {one.axis for one, _ in first}
     return tuple(mistakes), worst({axis: one for axis, one in structure(*fits[first]).items() if axis in concerned})
@@ -260,26 +243,6 @@ def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
         yield frozenset((one, scale) for one, scales in likely.items() if scale in scales)
     if likely:
         yield frozenset((one, scales[0]) for one, scales in likely.items())
-
-
-def _frames(compared: Sequence[_Match]) -> Iterator[Scaling]:
-    """Yield the channels of each source, and of each file, whose signs its frame decides.
-
-    At least one of them is suspected of the other sign, and none moves like the vehicle of the priors as it stands.
-    """
-    turned = [m for m in compared if m.axis in _MIRRORED]
-    sources = grouped(((m.file, source), m) for m in turned for source in (m.channel.source, ""))
-    for some in sources.values():
-        has_two = len({m.axis for m in some}) > 1
-        if has_two and any(-1.0 in m.scales for m in some) and not any(1.0 in m.ratios for m in some):
-            yield frozenset((m, -1.0) for m in some)
-
-
-def _frame_in_words(frame: Scaling) -> tuple[str, str]:
-    """Return what the frame of some channels is called, and a mistake in it as a question."""
-    sources = {match.channel.source for match, _ in frame}
-    question = f"do {FRAME}"
-    return f"frame of {sources.pop()}" if len(sources) == 1 else "frame", question
 
 
 def _corrected(tests: Tests, scaling: Scaling) -> Objective:
