@@ -266,13 +266,16 @@ def _unpushed(course: _Course, still: float) -> Flags:
     dived = place[~found & (place > -still)]
     least, largest = float(dived.min(initial=np.inf)), float(dived.max(initial=-np.inf))
     for start, end in true_runs(found):
-        if least + still < np.median(place[start : end + 1]) < largest - still:
+        at = float(np.median(place[start : end + 1]))
+        if least + still < at < largest - still:
             found[start : end + 1] = False
+        elif (load < 0.0) == (at > 0.5 * (least + largest)):  # something else brought it there, against the load
+            found[_moved_by_hand(course.push, start, -1) : start] = True
     return found
 
 
 def _moved_by_hand(told: Array, at: int, side: int) -> int:
     """Return until when a vehicle that left a deck is lowered by hand or by a crane: until its command changes.
-    With -1 for `side`, since when it is lifted."""
+    With -1 for `side`, since when it is lifted, or brought to where it rests."""
     changes = np.flatnonzero(told[at::side] != told[at])
     return at + side * int(changes[0]) if len(changes) else at

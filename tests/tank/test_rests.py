@@ -159,6 +159,12 @@ def stuck_below(t: float, s: State) -> None:
     s.w = 0.0 if 60.0 <= t < 80.0 else s.w
 
 
+def brought_below(t: float, s: State) -> None:
+    """Thrusters that are off from 60 to 80 s, while a hand takes a vehicle that floats to the bottom."""
+    s.down = 0.0 if 60.0 <= t < 80.0 else -0.4 if 80.0 <= t < 84.0 else s.down
+    s.w = 0.5 if 60.0 <= t < 80.0 else s.w
+
+
 def drifts_above(t: float, s: State) -> None:
     """Thrusters that are off at the surface, to which the load has lifted the vehicle."""
     s.down = 0.0 if t < 20.0 else 0.5 if t < 26.0 else s.down
@@ -190,6 +196,7 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
         (drawn(12, drifts_above, start=0.05, load=-0.5), [(0.0, 22.0)], [(1.0, 19.5)]),
         (drawn(11, stuck_below, dives_to(7.0), load=-0.5), [(0.0, 110.0)], [(63.0, 79.0)]),
+        (drawn(14, brought_below, dives_to(9.0)), [(59.0, 84.0)], [(61.0, 79.0)]),
         (drawn(10, rises_beyond, start=4.0, zeroed=4.0), [(0.0, 110.0)], [(14.0, 17.5)]),
     ],
     ids=[
@@ -204,6 +211,7 @@ def pushes_on(t: float, s: State) -> None:
         "wall",
         "thrusters off at the surface",
         "thrusters off on the bottom",
+        "brought to the bottom",
         "depth set to zero again",
     ],
 )
