@@ -15,9 +15,9 @@ from rov_fmu.c.simulation import usable_cores
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
+from rov_fmu.vehicle.vehicle import load_vehicle, without_surface
 
-from . import picture, runs, simulators, taylor
+from . import picture, runs, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import Steps
@@ -30,7 +30,6 @@ class Effort:
     repetitions: int = 25
     commands: int = 16384
     known: int = 64  # commands whose results are compared with 50 digits; with few, RK4 looks more exact than it is
-    manoeuvres: int = 5  # repetitions of what Python steps
     study_runs: tuple[int, ...] = (1000, 10_000, 100_000)
 
 
@@ -38,7 +37,7 @@ _HOW = """Medians of repetitions in turn: processor time on one core.
 A cell's second number is the error at the end of a held command against 50 digits, in SI units. Commands are held
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal.
 """
-_QUICK = Effort(3, 1024, manoeuvres=1, study_runs=(100, 400))
+_QUICK = Effort(3, 1024, study_runs=(100, 400))
 
 
 @click.command(help=__doc__)
@@ -61,14 +60,10 @@ def _command(quick: bool, picture_file: Path | None) -> None:
     print_sections(found)
 
 
-def _deep(name: str) -> Vehicle:
-    """Return a vehicle that ships, without its surface, which the other solvers and the references lack."""
-    return without_surface(load_vehicle(SHIPPED[name]))
-
-
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
     say = Console(stderr=True).status
-    rov, six, heavy = load_vehicle(VIDEORAY), _deep("bluerov2"), _deep("bluerov2_heavy")
+    rov = load_vehicle(VIDEORAY)
+    heavy = without_surface(load_vehicle(SHIPPED["bluerov2_heavy"]))  # the other solvers and the references have none
     if measurable():
         with say("steps in plain C"):
             steps = Steps(rov, heavy, effort.commands, effort.known)
@@ -85,9 +80,6 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
                 sizes = [*((h, taylor.VEHICLES) for h in taylor.STEPS), (1.0, taylor.MANY)]
                 found = [taylor.many_vehicles(one, h, effort.repetitions, cores, number) for h, number in sizes]
                 yield taylor.section(one.name, found)
-    with say("simulators"):
-        for one in (rov, six, heavy):
-            yield simulators.section(one, effort.manoeuvres)
     with say("studies"):
         native = build_fmu(rov, folder / "native.fmu", platforms=["host"]).path
         yield runs.studies(native, folder, effort.study_runs)

@@ -1,6 +1,6 @@
-"""Fit all methods to the training recordings of all data sets, predict the test recordings, and print the scores.
+"""Identify the vehicles of all data sets by their training recordings, and score what they predict of the others.
 
--o gets scores.csv, coefficients.csv and scores.svg. The recordings are not distributed: --data (or ROV_FMU_DATA) is the
+-o gets scores.csv and coefficients.csv. The recordings are not distributed: --data (or ROV_FMU_DATA) is the
 folder with your copies of the repositories; without it, only what is simulated is run.
 """
 
@@ -8,7 +8,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from pkgutil import resolve_name
 
 import click
 import pandas as pd
@@ -20,28 +19,14 @@ from rov_fmu.process import exit_code
 from verification.identification.data import DataSet, Recorded, split_of
 from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH
+from verification.identification.methods.identified import Identified
+from verification.identification.methods.unchanged import Unchanged
 from verification.identification.protocol import Method, run
 from verification.identification.scores import Table, numbers, scores
-from verification.identification.show import picture, print_scores
+from verification.identification.show import print_scores
 
 DATA_SETS: Sequence[DataSet] = (EXJOBB, TAUV, CALM, ROUGH)
-
-
-METHODS = (
-    "unchanged:Unchanged",
-    "unchanged:ConstantVelocity",
-    "least_squares:LeastSquares",
-    "output_error:OutputError",
-    "gaussian_process:GaussianProcess",
-    "neural_ode:NeuralODE",
-    "identified:Identified",
-)
-"""The modules and classes of the methods. They are imported when they are made, because some need an extra."""
-
-
-def make(name: str) -> Method:
-    """Return a new method."""
-    return resolve_name(f"verification.identification.methods.{name}")()  # type: ignore[no-any-return]
+METHODS: Sequence[type[Method]] = (Unchanged, Identified)
 
 
 @click.command(help=__doc__)
@@ -53,7 +38,7 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
     if unknown := next((name for name in only if name not in names), None):
         raise click.UsageError(f"--only {unknown}: there is no such data set, only {', '.join(names)}")
     output.mkdir(parents=True, exist_ok=True)
-    files = [output / name for name in ("scores.csv", "coefficients.csv", "scores.svg")]
+    files = [output / name for name in ("scores.csv", "coefficients.csv")]
     check_targets([(file, "") for file in files], force=True)
     log = Console(stderr=True)
     rows, found = [], []
@@ -63,8 +48,8 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
                 log.print(f"{one.name}: not run" + ("" if only else ", because --data is not given"))
                 continue
             split = split_of(one, data, Path(folder))
-            for name in METHODS:
-                outcome = run(make(name), split)
+            for method in METHODS:
+                outcome = run(method(), split)
                 log.print(f"{one.name}: {outcome.method.name}, {outcome.seconds:.1f} s")
                 rows.append(scores(outcome))
                 found.append(numbers(outcome))
@@ -76,7 +61,6 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
     tables: list[Table] = [pd.concat(rows), pd.concat(found)]
     print_scores(*tables)
     texts = [table.to_csv(index=False, float_format="%.6g", lineterminator="\n") for table in tables]
-    texts.append(picture(tables[0]))
     write_whole(*(Output(path, text.encode()) for path, text in zip(files, texts, strict=True)), force=True)
 
 

@@ -14,8 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
-from verification.identification.data import Recording, Split
+from verification.identification.data import Split
 
 SPANS = (1.0, 2.0, 5.0, 10.0, inf)
 """s."""
@@ -32,15 +33,13 @@ class Method(Protocol):
     """A method of identification."""
 
     name: str
-    uses_thrust: bool
-    """False if it needs nothing of rov.toml but the names of the columns."""
     has_bands: bool
     """True if its variances are those of measured minus predicted; False if the errors of the training are missing."""
 
     def fit(self, split: Split) -> None:
         """Fit the method to the training recordings."""
 
-    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
+    def predict(self, log: SampledLog, begin: float, span: float) -> tuple[Array, Array]:
         """Return the value and the variance for each sample of a recording; before `begin` they do not count.
 
         The predictions start anew at `begin` (s after the first sample) and after each span.
@@ -54,7 +53,7 @@ class Method(Protocol):
 class Predicted:
     """The predictions of one recording over one span. n samples."""
 
-    recording: Recording
+    log: SampledLog
     span: float
     error: Array
     """n: measured minus predicted, angles within half a turn."""
@@ -81,13 +80,13 @@ def run(method: Method, split: Split, spans: Sequence[float] = SPANS) -> Outcome
     bands = (
         None if method.has_bands else _Bands([_predicted(method, r, s, None) for r in split.training for s in spans])
     )
-    found = [_predicted(method, recording, span, bands) for recording in split.test for span in spans]
+    found = [_predicted(method, log, span, bands) for log in split.test for span in spans]
     return Outcome(method, split, found, process_time() - start)
 
 
-def ahead(recording: Recording, span: float) -> Array:
+def ahead(log: SampledLog, span: float) -> Array:
     """Return how long before each sample its prediction starts, s; negative before the first start."""
-    since = recording.log.record.time - recording.log.record.time[0] - BEGIN
+    since = log.record.time - log.record.time[0] - BEGIN
     return np.asarray(since if span == inf else np.where(since < 0.0, since, since % span))
 
 
@@ -97,9 +96,9 @@ class _Bands:
     def __init__(self, predictions: Sequence[Predicted]) -> None:
         sums: dict[str, Array] = {}
         for one in predictions:
-            place = np.searchsorted(_AHEAD, ahead(one.recording, one.span), side="right")
-            for number, m in enumerate(one.recording.channels):
-                own = one.counts & (one.recording.log.record.sensor == number)
+            place = np.searchsorted(_AHEAD, ahead(one.log, one.span), side="right")
+            for number, m in enumerate(one.log.measured):
+                own = one.counts & (one.log.record.sensor == number)
                 found = sums.setdefault(m.channel.quantity.name, np.zeros((2, len(_AHEAD) + 1)))
                 for row, weights in enumerate((np.ones(own.sum()), one.error[own] ** 2)):
                     found[row] += np.bincount(place[own], weights, len(_AHEAD) + 1)
@@ -109,19 +108,19 @@ class _Bands:
             nearest = seen[np.argmin(np.abs(np.arange(len(count))[:, None] - seen), axis=1)]
             self._variances[name] = squares[nearest] / count[nearest]
 
-    def variance(self, recording: Recording, span: float) -> Array:
+    def variance(self, log: SampledLog, span: float) -> Array:
         """Return the variance of each sample of a recording."""
-        place = np.searchsorted(_AHEAD, ahead(recording, span), side="right")
-        rows = np.array([self._variances[m.channel.quantity.name] for m in recording.channels])
-        return np.asarray(rows[recording.log.record.sensor, place])
+        place = np.searchsorted(_AHEAD, ahead(log, span), side="right")
+        rows = np.array([self._variances[m.channel.quantity.name] for m in log.measured])
+        return np.asarray(rows[log.record.sensor, place])
 
 
-def _predicted(method: Method, recording: Recording, span: float, bands: _Bands | None) -> Predicted:
-    values, variance = method.predict(recording, BEGIN, span)
-    record = recording.log.record
+def _predicted(method: Method, log: SampledLog, span: float, bands: _Bands | None) -> Predicted:
+    values, variance = method.predict(log, BEGIN, span)
+    record = log.record
     error = record.value - values
-    wraps = np.array([m.channel.quantity.wraps for m in recording.channels])[record.sensor]
+    wraps = np.array([m.channel.quantity.wraps for m in log.measured])[record.sensor]
     error = np.where(wraps, (error + np.pi) % (2.0 * np.pi) - np.pi, error)
     if bands:
-        variance = variance + bands.variance(recording, span)
-    return Predicted(recording, span, error, np.sqrt(variance), record.time >= record.time[0] + BEGIN)
+        variance = variance + bands.variance(log, span)
+    return Predicted(log, span, error, np.sqrt(variance), record.time >= record.time[0] + BEGIN)

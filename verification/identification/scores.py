@@ -3,8 +3,7 @@
 `scores` has a row for each quantity and span: `error` is the root mean square of measured minus predicted and `noise`
 the standard deviation of the sensor's white noise, in SI units; `inside_50` and `inside_95` are the shares of the
 samples in the bands, and `width_50` and `width_95` the mean widths of these; `seconds` is the processor time of the
-method with this data set, and `edits` the number of values that a person entered into rov.toml for it. The span of open
-loop is infinite.
+method with this data set. The span of open loop is infinite.
 """
 
 from typing import Any
@@ -17,7 +16,7 @@ from rov_fmu.tank.arrays import Array
 from verification.identification.protocol import Outcome
 
 _COLUMNS = ["data", "method", "quantity", "unit", "span", "samples", "error", "noise"]
-_COLUMNS += ["inside_50", "inside_95", "width_50", "width_95", "seconds", "edits"]
+_COLUMNS += ["inside_50", "inside_95", "width_50", "width_95", "seconds"]
 Table = Any
 """A DataFrame. Its published types do not know what its groups and rows have."""
 REFERENCE = "no change"
@@ -38,7 +37,7 @@ def scores(outcome: Outcome) -> Table:
     """Return the scores of a method with a data set. The samples of all test recordings count equally."""
     samples = []
     for one in outcome.predictions:
-        channels, sensor = one.recording.channels, one.recording.log.record.sensor
+        channels, sensor = one.log.measured, one.log.record.sensor
         of_sensor: dict[str, Any] = {
             "quantity": [m.channel.quantity.name for m in channels],
             "unit": [m.channel.quantity.unit for m in channels],
@@ -47,13 +46,12 @@ def scores(outcome: Outcome) -> Table:
         columns = {name: np.array(values)[sensor] for name, values in of_sensor.items()}
         made = pd.DataFrame({**columns, "span": one.span, "error": one.error, "deviation": one.deviation})
         samples.append(made[one.counts])
-    method, split = outcome.method, outcome.split
     rows = []
     for (quantity, unit, span), own in pd.concat(samples).groupby(["quantity", "unit", "span"], sort=False):
-        row = {"data": split.name, "method": method.name, "quantity": quantity, "unit": unit, "span": span}
-        row |= {"samples": len(own), "noise": own.noise.drop_duplicates().median()}
+        row = {"data": outcome.split.name, "method": outcome.method.name, "quantity": quantity, "unit": unit}
+        row |= {"span": span, "samples": len(own), "noise": own.noise.drop_duplicates().median()}
         row |= bands(own.error.to_numpy(), own.deviation.to_numpy())
-        rows.append(row | {"seconds": outcome.seconds, "edits": split.edits[method.uses_thrust]})
+        rows.append(row | {"seconds": outcome.seconds})
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 

@@ -11,15 +11,16 @@ from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import around
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
-from verification.identification.data import Recording, Split
+from verification.identification.data import Split
 from verification.identification.protocol import Known
 
 
 class Identified:
     """`rov-fmu identify`: the vehicle of the file, and the covariance of its parameters."""
 
-    name, uses_thrust, has_bands = "rov-fmu", True, True
+    name, has_bands = "rov-fmu", True
     tests: Tests
     found: Fit
 
@@ -27,12 +28,12 @@ class Identified:
         """Fit all parameters to the training recordings."""
         self.tests = split.tests
         with threadpool_limits(limits=1, user_api="blas"):
-            self.found = fit_all(split.known, [r.log for r in split.training], split.rows)
+            self.found = fit_all(split.known, split.training, split.rows)
 
-    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
+    def predict(self, log: SampledLog, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
         own = self.found.file.posterior
-        table = table_of(self.found.known, [recording.log], [])
+        table = table_of(self.found.known, [log], [])
         z = np.array([p.mean for p in table.parameters])
         covariance = np.diag([p.deviation**2 for p in table.parameters])
         indices = [(n, own.table.index(p.kind, p.of, p.part)) for n, p in enumerate(table.parameters) if p.log is None]
@@ -41,9 +42,9 @@ class Identified:
         for n, p in enumerate(table.parameters):
             if p.of_kind.differs_by_log:
                 covariance[n, n] = held_out.unseen_variance(own.table, own.z, own.covariance, p)
-        objective = Objective(table, [recording.log], [])
+        objective = Objective(table, [log], [])
         off, deviations = held_out.ahead(objective, 0, held_out.cautious(objective, z), covariance, begin, span)
-        return recording.log.record.value - off, deviations**2
+        return log.record.value - off, deviations**2
 
     def coefficients(self, axis: Axis) -> Known:
         """Return the answers that `rov-fmu identify` gives, and the drag over the inertia with its posterior."""
