@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from verification.references.pool import Array, swim
+from verification.references.pool import Array, stick, swim
 
 LAG = 0.15
 """The time constant of the thrusters (s)."""
@@ -72,7 +72,9 @@ def dive(seconds: float = 90.0, seed: int = 0) -> Dive:
     """A dive by hand: each stick stays for a few seconds and then moves elsewhere, often back to the middle."""
     random = np.random.default_rng(seed)
     time = np.arange(round(seconds * _RATE)) / _RATE
-    sticks = np.array([_stick(random, len(time), *stick) for stick in _STICKS])
+    sticks = np.array(  # which move when the outputs are logged
+        [stick(random, len(time), most, _RATE * hold, every=2) for *most, hold in _STICKS]
+    )
     sticks[:, time < 3.0] = 0.0
     outputs = {
         name: np.rint(_NEUTRAL + _SPAN * np.clip(np.array(factors) @ sticks, -1.0, 1.0))
@@ -81,17 +83,6 @@ def dive(seconds: float = 90.0, seed: int = 0) -> Dive:
     commands = {name: (output - _NEUTRAL) / _SPAN for name, output in outputs.items()}
     motion = swim(bluerov2(), time, commands, current=CURRENT)
     return Dive(time, outputs, motion | {"z": motion["z"] + DEPTH})
-
-
-def _stick(random: np.random.Generator, n: int, ahead: float, back: float, hold: float) -> Array:
-    """Where a stick stands: a third of the time in the middle, else to one side and then the other."""
-    found, side = np.empty(0), ahead
-    while len(found) < n:
-        samples = 2 * round(0.5 * _RATE * hold * random.uniform(0.5, 1.5))  # moves when the outputs are logged
-        level = 0.0 if random.random() < 1 / 3 else side * random.uniform(0.4, 1.0)
-        side = (-back if side > 0.0 else ahead) if level else side
-        found = np.append(found, np.full(samples, level))
-    return found[:n]
 
 
 def write_log(path: Path, dived: Dive, seed: int = 0, *, force: bool = False, dvl: bool = True) -> None:

@@ -1,6 +1,6 @@
 """Recordings of a vehicle with known coefficients: the motion by the integrator of the pool, with noise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from math import radians
@@ -10,8 +10,10 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXIS, CURVE, HEAVE, SURGE, YAW, Axis, coefficient_name
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.vehicle import Vehicle
-from verification.references.pool import swim
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.folders import HEAD, folder_of
+from verification.references.pool import stick, swim
 
 Plan = Sequence[tuple[float, float]]
 """Commands with their durations, s."""
@@ -134,3 +136,64 @@ def run(k: Vehicle, axis: Axis, plan: Plan, rate: float) -> Run:
     motion = swim(k, time, thrusters)
     position = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
     return Run(axis, time, command, motion[axis.velocity], motion[position])
+
+
+# ---- Dives -----------------------------------------------------------------------------------------------------------
+
+RATE = 20
+"""The rows of the log of a dive per second."""
+_STICKS = {SURGE: (0.7, 5.0), HEAVE: (0.7, 6.0), YAW: (0.3, 3.0)}
+"""The farthest place of each stick, and for how long about it stays, s."""
+
+
+SHOWN = {"u": NOISE["velocity"], "z": NOISE["depth"], "psi": NOISE["heading"]}
+"""The standard deviation of the sensor of each state in a dive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dive:
+    """n samples of a dive of the VideoRay by hand, SI units, without noise."""
+
+    time: Array
+    commands: Mapping[str, Array]
+    """By thruster, fractions of the full command."""
+    shown: Mapping[str, Array]
+    """What its sensors show, by the name of the state: surge velocity over ground, depth, heading."""
+
+    def noisy(self, random: np.random.Generator) -> dict[str, Array]:
+        """Return the values with the noise of the sensors."""
+        return {name: v + SHOWN[name] * random.standard_normal(len(v)) for name, v in self.shown.items()}
+
+
+def dive(random: np.random.Generator, seconds: float, current: tuple[float, float] = (0.0, 0.0)) -> Dive:
+    """Dive in a current, whose velocity north and east is given, m/s. β of surge differs from 1, where a fit begins."""
+    k, n = load_vehicle(VIDEORAY).with_(beta_u=0.8), round(seconds * RATE)
+    commands = {thruster.name: np.zeros(n) for thruster in k.layout.thrusters}
+    for axis, (most, held) in _STICKS.items():
+        moved = stick(random, n, (most, most), RATE * held)
+        moved[: 4 * RATE] = 0.0
+        for name, sign in k.layout.signs(axis).items():
+            commands[name.removeprefix("u_")] += sign * moved
+    commands = {name: np.clip(command, -1.0, 1.0) for name, command in commands.items()}
+    time = np.arange(n) / RATE
+    motion = swim(k, time, commands, current=current)
+    over_ground = motion["u"] + current[0] * np.cos(motion["psi"]) + current[1] * np.sin(motion["psi"])
+    return Dive(time, commands, {"u": over_ground, "z": motion["z"], "psi": motion["psi"]})
+
+
+def write_dives(folder: Path, seed: int, count: int, seconds: float, current: tuple[float, float] = (0.0, 0.0)) -> Path:
+    """Write a folder of dives of a VideoRay whose thrust is exactly that of the base."""
+    random, logs = np.random.default_rng(seed), {}
+    for n in range(count):
+        dived = dive(random, seconds, current)
+        noisy = dived.noisy(random)
+        table = {"time [s]": dived.time} | {f"u_{name} [%]": 100.0 * c for name, c in dived.commands.items()}
+        table |= {
+            "surge velocity [m/s]": noisy["u"],
+            "depth [m]": noisy["z"],
+            "heading [deg]": np.degrees(noisy["psi"]),
+        }
+        rows = (",".join(f"{value:.8g}" for value in row) for row in zip(*table.values(), strict=True))
+        logs[f"log_{n}.csv"] = "\n".join([",".join(table), *rows, ""])
+    priors = "[priors]\nthrust = 0.0\nthrust_shape = 0.0\n"
+    return folder_of(folder, f'base = "videoray"\n{HEAD}\n{priors}', logs)

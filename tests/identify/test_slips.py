@@ -26,9 +26,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN
-from tests.identify.scenarios.catalogue import COMPLETE
 from tests.often import spread
-from tests.recordings import PLANS, Measured, run
+from tests.recordings import PLANS, Measured, run, write_dives
 from tests.vehicles import VIDEORAY
 
 SENSOR = {"surge": "distance", "heave": "depth", "yaw": "heading"}
@@ -262,7 +261,7 @@ def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
 
 def mirrored(folder: Path, *columns: str) -> Path:
     """Write dives in all axes, and return the last one, in which some columns have the other sign."""
-    COMPLETE["pilot"].write(0, folder)
+    write_dives(folder, seed=0, count=3, seconds=60.0)
     file = sorted(folder.glob("*.csv"))[-1]
     header, *rows = (line.split(",") for line in file.read_text(encoding="utf-8").splitlines())
     for index in map(header.index, columns):

@@ -18,10 +18,8 @@ from rov_fmu.tank.quality import uninterrupted
 from rov_fmu.tank.rest import without_rests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.identify.scenarios.catalogue import USUAL
-from tests.identify.scenarios.tank import Logs, Tank
+from tests.recordings import write_dives
 from tests.tank.logs import channel, commands, log, used
-from verification.references.pool import Conditions
 
 LAYOUT = load_vehicle(SHIPPED["bluerov2"]).layout
 STEP = 0.02
@@ -253,9 +251,8 @@ def test_neither_depth_0_in_a_tank_without_a_surface_nor_a_current_is_a_rest(
 ) -> None:
     """A current stops a vehicle by its heading."""
     for seed in range(2):
-        tank = Tank("videoray", Logs("pilot", count=2, seconds=20.0), USUAL, conditions=Conditions(current=current))
-        tank.write(seed, tmp_path / str(seed))
-        assert not [one for one in read_folder(tmp_path / str(seed)).findings if one.kind == "rests"]
+        folder = write_dives(tmp_path / str(seed), seed, count=2, seconds=20.0, current=current)
+        assert not [one for one in read_folder(folder).findings if one.kind == "rests"]
 
 
 def test_a_log_of_a_single_axis_and_one_that_only_rests_stay_as_they_are() -> None:

@@ -20,9 +20,8 @@ from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT, Capsys
-from tests.identify.scenarios.catalogue import USUAL
-from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
 from tests.often import spread
+from tests.recordings import SHOWN, dive, write_dives
 from tests.vehicles import with_intervals
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
@@ -52,23 +51,18 @@ def test_the_range_of_200_draws_contains_the_samples_of_an_unseen_dive(seed: int
     The range of each sample is that of 90 % of the draws, with the same noise. It contains more of them, because the
     intervals of the file contain those of the fit with all effects, among them the power of drag.
     """
-    tank = replace(Tank(sensors=USUAL), logs=Logs("pilot", count=2, seconds=20.0))
-    tank.write(seed, tmp_path / "dives")
-    vehicle = identify(load_tests(tmp_path / "dives")).vehicle
+    vehicle = identify(load_tests(write_dives(tmp_path / "dives", seed, count=2, seconds=20.0))).vehicle
     random = np.random.default_rng(1000 + seed)
-    dive = next(flights(tank, random))
-    motion = moved(tank.truth, dive.commands, dive.time, dive.conditions)
+    unseen = dive(random, 20.0)
     drawn = vehicle.draws(200, np.random.default_rng(1))
-    inputs = {f"u_{name}": values for name, values in dive.commands.thrusters.items()}
+    inputs = {f"u_{name}": values for name, values in unseen.commands.items()}
     write_vehicle(vehicle, tmp_path / "found.toml")
     many = rov_fmu.load(tmp_path / "found.toml")
-    runs = many.simulate_many(dive.time, {"time": dive.commands.switches, **inputs}, coefficients=drawn)
+    runs = many.simulate_many(unseen.time, inputs, coefficients=drawn)
     inside = []
-    for sensor in tank.sensors:
-        values = true_values(sensor, motion)
-        sample = values + sensor.noise * random.standard_normal(len(values))
-        every = runs[{"velocity": "u", "depth": "z", "heading": "psi"}[sensor.quantity]]
-        low, high = np.quantile(every + sensor.noise * random.standard_normal(every.shape), [0.05, 0.95], axis=0)
+    for name, sample in unseen.noisy(random).items():
+        noisy = runs[name] + SHOWN[name] * random.standard_normal(runs[name].shape)
+        low, high = np.quantile(noisy, [0.05, 0.95], axis=0)
         inside.append(np.mean((low <= sample) & (sample <= high)))
     assert 0.85 <= min(inside) <= max(inside) <= 0.99
 

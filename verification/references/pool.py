@@ -5,10 +5,10 @@ and the integration begins anew at each of them. `Conditions` adds what a real d
 that roll and pitch are those of rigid_pool.py.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, pi, sin
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,23 +46,6 @@ class Commands:
 
 
 @dataclass(frozen=True)
-class Tilt:
-    """A vehicle that has neither roll nor pitch oscillates about both: phi and theta are sines of the time."""
-
-    amplitude: float
-    """The largest angle, rad."""
-    roll_period: float = 7.0
-    pitch_period: float = 11.0
-    """s."""
-
-    def at(self, time: float) -> tuple[float, float, float]:
-        """Return phi, theta and the rate of theta."""
-        roll, pitch = 2.0 * pi / self.roll_period, 2.0 * pi / self.pitch_period
-        A = self.amplitude
-        return A * sin(roll * time), A * sin(pitch * time), A * pitch * cos(pitch * time)
-
-
-@dataclass(frozen=True)
 class Conditions:
     """What acts on a vehicle in addition to its equation of motion."""
 
@@ -70,15 +53,10 @@ class Conditions:
     """The time from a command to its effect, s."""
     current: tuple[float, float] = (0.0, 0.0)
     """The velocity of the water north and east, m/s."""
-    saturation: float = 1.0
-    """The largest command that the thrusters follow."""
     thrust: Callable[[float], float] | None = None
     """The factor of all thrust as a function of the time (s), such as that of a battery that empties."""
     tether: Vector = (0.0, 0.0, 0.0)
     """The stiffness of a tether that pulls back to the start, by the displacement north, east and down, N/m."""
-    tilt: Tilt | None = None
-    """The roll and pitch of a vehicle that has neither axis. Thrust and velocity tilt with the vehicle, its net weight
-    F_0_w stays vertical. The products of its velocities with the rates of roll and pitch are left out."""
 
 
 NOTHING = Conditions()
@@ -96,6 +74,20 @@ def swim(
     changes = np.concatenate([[0], np.flatnonzero(np.any(changed, axis=0)) + 1])
     commands = Commands(time[changes], {name: values[changes] for name, values in thrusters.items()})
     return motion(k, commands, time, Conditions(delay, current))
+
+
+def stick(random: np.random.Generator, n: int, most: Sequence[float], held: float, every: int = 1) -> Array:
+    """Return where a pilot holds a stick in n rows: a third of the time in the middle, else on alternating sides.
+
+    `most` has the farthest places ahead and astern; a place is held for about `held` rows, a multiple of `every`.
+    """
+    found, side = np.empty(0), 0
+    while len(found) < n:
+        rows = every * round(held / every * random.uniform(0.5, 1.5))
+        level = 0.0 if random.random() < 1 / 3 else (1 - 2 * side) * most[side] * random.uniform(0.4, 1.0)
+        side = 1 - side if level else side
+        found = np.append(found, np.full(rows, level))
+    return found[:n]
 
 
 def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
@@ -139,9 +131,9 @@ def _holds(
     layout: Layout, commands: Commands, conditions: Conditions, begin: float, end: float
 ) -> Iterator[tuple[float, float, Array]]:
     """Yield the start and the end of each hold, with the command that each thruster of the layout follows."""
-    still, most = np.zeros(len(commands.switches)), conditions.saturation
+    still = np.zeros(len(commands.switches))
     held = np.column_stack([commands.thrusters.get(thruster.name, still) for thruster in layout.thrusters])
-    held = np.vstack([np.zeros(held.shape[1]), np.clip(held, -most, most)])
+    held = np.vstack([np.zeros(held.shape[1]), np.clip(held, -1.0, 1.0)])
     bounds = [begin, *np.clip(commands.switches + conditions.delay, begin, end).tolist(), end]
     for (start, stop), command in zip(pairwise(bounds), held, strict=True):
         if stop > start:
@@ -159,36 +151,22 @@ def _rates(k: Vehicle, command: Array, given: Conditions) -> Rates:
     }
     held = driven(k, steady, {}, FLOATS)
     n, lags = len(held.axes), [*held.lags.values()]
-    weight = k.coefficients.get("F_0_w", 0.0) if given.tilt and "w" in held.axes else 0.0
     pulled = [(at, PLACES[name], axis.inertia) for at, (name, axis) in enumerate(held.axes.items()) if name in PLACES]
 
     def derivatives(time: float, state: Array) -> list[float]:
         y = state.tolist()
         thrust = given.thrust(time) if given.thrust else 1.0
-        phi, theta, theta_rate = given.tilt.at(time) if given.tilt else (0.0, 0.0, 0.0)
-        R = _rotation(phi, theta, y[n + 3])
+        c, s = cos(y[n + 3]), sin(y[n + 3])
+        R = (c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)  # from the body to the earth frame
         found = held.accelerations(y[:n], y[n + 4 :], thrust=thrust)
         earth = [-stiffness * x for stiffness, x in zip(given.tether, y[n : n + 3], strict=True)]
-        earth[2] += weight
         for at, column, inertia in pulled if any(earth) else ():
-            force = sum(R[row][column] * earth[row] for row in range(3)) - (weight if column == 2 else 0.0)
-            found[at] += force / inertia
+            found[at] += sum(R[row][column] * earth[row] for row in range(3)) / inertia
         u, v, w, r = held.level(y)
         north, east, down = (row[0] * u + row[1] * v + row[2] * w for row in R)
-        found += [north + given.current[0], east + given.current[1], down]
-        found.append((r + theta_rate * sin(phi)) / (cos(phi) * cos(theta)))
+        found += [north + given.current[0], east + given.current[1], down, r]
         for lag, x in zip(lags, y[n + 4 :], strict=True):
             found.append((thrust * lag.target - x) / lag.T)
         return found
 
     return derivatives
-
-
-def _rotation(phi: float, theta: float, psi: float) -> tuple[Vector, Vector, Vector]:
-    """Return the matrix from the body to the earth frame."""
-    (cf, sf), (ct, st), (cp, sp) = ((cos(angle), sin(angle)) for angle in (phi, theta, psi))
-    return (
-        (cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
-        (sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
-        (-st, ct * sf, ct * cf),
-    )

@@ -1,6 +1,6 @@
 """The simulated pool of pool.py for vehicles that roll and pitch: the rigid body of rigid_body.py in six degrees.
 
-Commands and conditions are those of pool.py. A tilt has no meaning here, because the vehicle rolls and pitches itself.
+Commands and conditions are those of pool.py.
 """
 
 from dataclasses import replace
@@ -26,7 +26,6 @@ def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions =
     """
     assert k.layout.has_attitude
     assert not k.layout.mix
-    assert not conditions.tilt
 
     fine = np.union1d(time, np.arange(time[0], time[-1], _FINEST))
     start = np.zeros(13 + len(k.layout.lagging))

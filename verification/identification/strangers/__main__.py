@@ -1,7 +1,8 @@
 """Identify vehicles that break the equation, and as many that obey it, and print how often a verdict was wrong.
 
 A seed is used once: a method that has been changed after a look at the folders of a seed is judged by other seeds.
-Each folder is a line of JSON in the file -o, and a folder that this file has is not run again.
+Each folder is a line of JSON in the file -o, and a folder that this file has is not run again. The exit code is 1 if
+too many verdicts are wrong. --sample judges the same few seeds each time, to notice a change that spoils something.
 """
 
 import multiprocessing
@@ -20,6 +21,13 @@ from verification.identification.strangers import gates
 from verification.identification.strangers.judge import Judged, judged, judged_case, name_of, read
 from verification.identification.strangers.kinds import BY_NAME
 
+SAMPLE = 9240001, 12
+"""The first seed of a sample, and the number of its seeds."""
+
+
+class BrokenError(Exception):
+    """Too many verdicts are wrong."""
+
 
 @click.command(help=__doc__)
 @click.option("--seed", type=int, default=None, metavar="FIRST", help="The first seed.")
@@ -27,7 +35,8 @@ from verification.identification.strangers.kinds import BY_NAME
 @click.option("--axes", type=click.Choice(["2", "4"]), default="2", help="The axes of each vehicle.")
 @click.option("--kind", type=click.Choice([*BY_NAME]), default=None, help="All seeds have this kind.")
 @click.option("--processes", type=click.IntRange(1), default=1, metavar="P")
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, metavar="FILE.jsonl")
+@click.option("--sample", is_flag=True, help=f"{SAMPLE[1]} seeds of two axes by two processes: about a minute.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE.jsonl")
 @click.option("--keep", metavar="STAGE", help="Keep the table of this file under this name, for the documentation.")
 @click.argument("cases", nargs=-1, type=click.Path(path_type=Path, exists=True, file_okay=False))
 def _command(
@@ -36,16 +45,21 @@ def _command(
     axes: str,
     kind: str | None,
     processes: int,
-    output: Path,
+    sample: bool,
+    output: Path | None,
     keep: str | None,
     cases: Sequence[Path],
 ) -> None:
     """Judge the folders of seeds, or CASES, each with train/ and truth.json or with such folders."""
+    if sample:
+        (seed, folders), processes = SAMPLE, 2
     try:
-        done = [read(line) for line in output.read_text(encoding="utf-8").splitlines()] if output.exists() else []
+        lines = output.read_text(encoding="utf-8").splitlines() if output and output.exists() else []
+        done = [read(line) for line in lines]
     except (TypeError, ValueError, KeyError):
         raise click.UsageError(f"-o {output}: it exists, and has other lines than this program writes") from None
-    output.open("a", encoding="utf-8").close()  # before the work, in case it cannot be written
+    if output:
+        output.open("a", encoding="utf-8").close()  # before the work, in case it cannot be written
     names = {one.name for one in done}
     work: list[tuple[str, Callable[[], Judged]]] = [
         (path.name, partial(judged_case, path)) for case in cases for path in _with_truth(case)
@@ -57,8 +71,9 @@ def _command(
     for number, one in enumerate(_run(jobs, processes), 1):
         console(stderr=True).print(f"{number} of {len(jobs)}: {one.name}, {one.kind}, {one.seconds:.0f} s")
         done.append(one)
-        with output.open("a", encoding="utf-8") as file:
-            file.write(f"{one.line()}\n")
+        if output:
+            with output.open("a", encoding="utf-8") as file:
+                file.write(f"{one.line()}\n")
     _print(gates.cases(done))
     if drawn := [one for one in done if one.count]:
         now = [gates.stage(keep or "now", drawn)]
@@ -66,6 +81,8 @@ def _command(
             _print(rows)
         if keep:
             gates.keep(now[0])
+        if broken := gates.broken(now[0]):
+            raise BrokenError("; ".join(broken))
 
 
 def _with_truth(folder: Path) -> list[Path]:
@@ -95,8 +112,8 @@ def _print(rows: gates.Table) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 measured, 2 bad input, 130 interrupted."""
-    codes: dict[type[Exception], int] = {OSError: 2, FileError: 2, click.ClickException: 2}
+    """Run the command line; the exit code: 0 measured, 1 a gate is broken, 2 bad input, 130 interrupted."""
+    codes: dict[type[Exception], int] = {BrokenError: 1, OSError: 2, FileError: 2, click.ClickException: 2}
     name = "python -m verification.identification.strangers"
     return exit_code("strangers", lambda: _command(arguments, name, standalone_mode=False), codes)
 

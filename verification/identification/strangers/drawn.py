@@ -119,6 +119,7 @@ class Drawn:
     def write(self, folder: Path) -> None:
         """Write rov.toml, the table of thrust, and the logs."""
         random, b = np.random.default_rng([self.seed, self.count, 3]), self.body
+        late = np.random.default_rng([self.seed, self.count, 4]).standard_normal((len(self.commands), DIVES))
         text = _HEAD.format(mass=b.mass, turning=b.turning, coupling="coupling = true\n" if self.count == 4 else "")
         for n, name in self.thrusters.items():
             x, y, z = (DRIVEN[axis, n] for axis in (SURGE, SWAY, HEAVE))
@@ -133,9 +134,12 @@ class Drawn:
         files = {"rov.toml": text, **table}
         for dive in range(DIVES):
             heads = ["time [s]", *(f"{name} [%]" for name in self.thrusters.values())]
-            values = [ROW * np.arange(len(self.commands)), *(100.0 * self.commands[:, [*self.thrusters], dive].T)]
+            stamps = ROW * np.arange(len(self.commands)) + self.kind.jitter * late[:, dive]
+            values = [stamps, *(100.0 * self.commands[:, [*self.thrusters], dive].T)]
             for axis in self.axes:
                 shown = self.columns[axis][:, dive] + _NOISE[axis] * random.standard_normal(len(self.commands))
+                if axis == HEAVE and self.kind.steps:
+                    shown = self.kind.steps * np.round(shown / self.kind.steps)
                 heads.append(HEADERS[axis])
                 values.append(np.degrees(shown) % 360.0 if axis == YAW else shown)
             if self.kind.is_cut:

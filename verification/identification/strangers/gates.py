@@ -83,6 +83,21 @@ def stages(path: Path = STAGES) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
 
+def broken(one: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong with the verdicts of a stage; a gate of which there is no axis is not broken."""
+    some: Mapping[str, Counts] = one["groups"]
+    fitted, shown = (_sum((some.get(group, {}) for group in of), "good") for of in (FITTED, (SHOWN,)))
+    right = some.get(RIGHT, {})
+    good, all_ = _sum([right], "good")[0], _sum([right], *right)[0]
+    inside, answers, _ = one["inside"]
+    return [
+        *(["too many *good* axes that the law fits are wrong"] if fitted[1] > 0.03 * fitted[0] else []),
+        *(["too many *good* axes of strangers are wrong"] if shown[1] > 0.08 * shown[0] else []),
+        *(["too few axes of right models are *good*"] if good < 0.85 * all_ else []),
+        *(["too few answers of right models are inside"] if inside < 0.98 * answers else []),
+    ]
+
+
 # ---- Tables ----------------------------------------------------------------------------------------------------------
 
 

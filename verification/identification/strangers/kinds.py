@@ -65,6 +65,10 @@ class Kind:
     reach: float = 1.0
     ahead: float = 0.0
     """Those of Body: where the thrusters are beside what rov.toml says."""
+    jitter: float = 0.0
+    """The standard deviation of the error of each time stamp, s."""
+    steps: float = 0.0
+    """The smallest difference of the depths in a log, m."""
     is_cut: bool = False
     """True if each log lacks 3 s in its middle, so that it is read in two pieces."""
     group: str = "stranger"
@@ -343,6 +347,21 @@ def _swapped(rows: Array) -> Array:
     return np.asarray(rows[:, [STBD, PORT, 2, 3]])
 
 
+def _late(rows: Array) -> Array:
+    return np.concatenate([0.0 * rows[:2], rows[:-2]])
+
+
+def _drifting(columns: dict[int, Array], _: np.random.Generator) -> None:
+    psi, (north, east) = columns[YAW], (0.06, -0.03)
+    columns[SURGE] += north * np.cos(psi) + east * np.sin(psi)
+    if SWAY in columns:
+        columns[SWAY] += east * np.cos(psi) - north * np.sin(psi)
+
+
+def _slowly(values: Array, random: np.random.Generator) -> Array:
+    return values + 0.02 * _filtered(random.standard_normal(values.shape) * np.sqrt(2.0 / ROW), 1.0)
+
+
 AS_MODELLED = Kind("as modelled", "nothing else", group="law")
 FAULTS = (
     Kind("weak thruster", "port has 55 % of its thrust", _weak, causes=r"weak thruster .*port", group="law"),
@@ -440,6 +459,13 @@ OTHERS = (
     Kind("unlike 0.97", "port has 97 % of its thrust", _with_strength(0.97), group="law"),
     Kind("unlike 1.03", "port has 103 % of its thrust", _with_strength(1.03), group="law"),
     Kind("places", "arms are 2 % longer, and the lateral thruster 5 mm ahead", reach=1.02, ahead=0.005, group="law"),
+    Kind("late commands", "commands act 0.2 s late", wired=_late, group="law"),
+    Kind("current", "the water flows with 7 cm/s under a DVL that sees the ground", shown=_drifting, group="law"),
+    Kind(
+        "slow noise", "an estimator's velocity errs by 2 cm/s for about 1 s", shown=_of_velocities(_slowly), group="law"
+    ),
+    Kind("jitter", "each time stamp errs by 10 ms", jitter=0.01, group="law"),
+    Kind("coarse depth", "the log has depths in steps of 1 cm", steps=0.01, group="law", counts=(1, 4)),
     Kind("cut", "each log lacks 3 s in its middle", is_cut=True, group="law"),
     Kind(
         "near",
