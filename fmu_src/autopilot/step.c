@@ -2,10 +2,6 @@
  * variables; the tables of the thrusters are constants (model.h). It samples at the start of a step, and its commands are there at the end. */
 #include "autopilot.c"
 
-#ifndef MOST_PIECES
-#define MOST_PIECES 2
-#endif
-
 enum { N_STATE = sizeof(loop_state) / sizeof(double), N_GAINS = sizeof(loop_gains) / sizeof(double) };
 
 typedef struct {
@@ -16,20 +12,7 @@ typedef struct {
     int waiting; /* no command waits: C has no empty struct */
 } delay_line;
 
-static double value_at(const double at[], int place)
-{
-    return place >= 0 ? at[place] : 0.0;
-}
-
-static bool all_finite(const double x[], int n)
-{
-    for (int i = 0; i < n; i++) {
-        if (!isfinite(x[i])) {
-            return false;
-        }
-    }
-    return true;
-}
+#include "sampled.c"
 
 static void model_prepare(const double at[], model_numbers *n)
 {
@@ -41,55 +24,10 @@ static void model_prepare(const double at[], model_numbers *n)
     }
 }
 
-static bool model_is_definite(const model_numbers *n)
-{
-    (void)n;
-    return true;
-}
-
-static void model_begin(double at[], double *heading)
-{
-    (void)at, (void)heading;
-}
-
-/* The only state is the time since the start. */
 static void model_calculate(double at[], const model_numbers *n, double heading)
 {
     (void)n, (void)heading;
-    at[FIRST_CALCULATED] = 1.0;
-}
-
-static void model_tangent(const double at[], double d[])
-{
-    (void)at;
-    d[FIRST_CALCULATED] = 0.0;
-}
-
-static void model_begin_tangent(const double at[], double d[])
-{
-    (void)at, (void)d;
-}
-
-static bool model_has_direction(const double x[])
-{
-    (void)x;
-    return true;
-}
-
-static double model_heading(const double at[], double heading)
-{
-    (void)at;
-    return heading;
-}
-
-static void current_keep(double at[])
-{
-    (void)at;
-}
-
-static void delay_commit(double at[], delay_line *line, double t, double h)
-{
-    (void)at, (void)line, (void)t, (void)h;
+    at[FIRST_CALCULATED] = 1.0; /* the rate of the time since the start */
 }
 
 /* Set the Euler angles to those of the quaternion, if the pose has one. */

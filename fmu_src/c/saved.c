@@ -1,10 +1,12 @@
 /* Saving, restoring and serializing the complete state (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
 
 /* The serialized state consists of: magic, token, type, mode, flags, time, stop, the heading of a vehicle with an attitude,
- * values, the changes of commands that wait for the dead time, checksum. Each number has its least
+ * values, the changes of commands that wait for the dead time or the memory of a model that samples, checksum. Each number has its least
  * significant byte first. */
 #if HAS_DEAD_TIME
 enum { N_DELAY_WORDS = 1 + MOST_WAITING * (2 + N_COMMANDS) };
+#elif defined LINE_OF_DOUBLES
+enum { N_DELAY_WORDS = sizeof(delay_line) / sizeof(double) };
 #else
 enum { N_DELAY_WORDS = 0 };
 #endif
@@ -57,7 +59,7 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
     return hash;
 }
 
-/* Serialize the changes of commands that wait for the dead time. */
+/* Serialize the changes of commands that wait for the dead time, or the memory of a model that samples. */
 static void put_line(unsigned char **to, const delay_line *line)
 {
 #if HAS_DEAD_TIME
@@ -69,13 +71,16 @@ static void put_line(unsigned char **to, const delay_line *line)
             put_double(to, n < line->waiting ? line->commands[n][i] : 0.0);
         }
     }
+#elif defined LINE_OF_DOUBLES
+    for (int i = 0; i < N_DELAY_WORDS; i++) {
+        put_double(to, ((const double *)line)[i]);
+    }
 #else
     (void)to, (void)line;
 #endif
 }
 
-/* Deserialize the changes of commands that wait for the dead time. Return false unless their number is allowed, all numbers are
- * finite, and the times do not fall. */
+/* Deserialize what put_line serializes. Return false unless the number of changes is allowed, all numbers are finite, and the times do not fall. */
 static bool get_line(const unsigned char **from, delay_line *line)
 {
     bool valid = true;
@@ -93,6 +98,11 @@ static bool get_line(const unsigned char **from, delay_line *line)
             valid = valid && isfinite(line->commands[n][i]);
         }
     }
+#elif defined LINE_OF_DOUBLES
+    for (int i = 0; i < N_DELAY_WORDS; i++) {
+        ((double *)line)[i] = get_double(from);
+    }
+    valid = all_finite((const double *)line, N_DELAY_WORDS);
 #else
     (void)from, (void)line;
 #endif

@@ -356,3 +356,9 @@ def c_sources(layout: Layout) -> dict[str, str]:
     used = sorted(names - {*unused_sources(layout)})
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in used}
     return generated_sources(layout) | shared
+
+
+def sampled_sources() -> dict[str, str]:
+    """Return the C files that models have in common which sample their inputs once per step, by their names."""
+    sampled = (C_SOURCES / "sampled.c").read_text(encoding="utf-8")
+    return {"sampled.c": sampled, "series.c": "/* What samples its inputs has no series. */\n"}

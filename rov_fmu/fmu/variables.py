@@ -67,6 +67,24 @@ class DeclaredVariable:
         return "CALCULATED_STATE" if self.name in QUATERNION else "CALCULATED"
 
 
+class VariableList(list[DeclaredVariable]):
+    """The variables of a model that samples its inputs (fmu_src/c/sampled.c), in the order in which they are added."""
+
+    def add(self, name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> int:
+        """Add a variable; `rest` are further attributes. Return its value reference."""
+        given = {"display_unit": declaration.display_unit, **rest}
+        about = declaration.description, declaration.unit
+        self.append(DeclaredVariable(name, len(self), *about, causality, variability, **given))
+        return self[-1].value_reference
+
+    def add_clock(self) -> None:
+        """Add the only state, the time since the start, with its derivative."""
+        elapsed, rate = Declaration("s", "Time since the start"), Declaration("1", "Rate of the time since the start")
+        self.add("elapsed", elapsed, "output", "continuous", initial="exact", start=0.0, dependencies={})
+        rest: dict[str, Any] = {"derivative_of": "elapsed", "dependencies": {}, "display_unit": None}
+        self.add("der(elapsed)", rate, "local", "continuous", initial="calculated", **rest)
+
+
 # ---- Descriptions of the derivatives ---------------------------------------------------------------------------------
 
 

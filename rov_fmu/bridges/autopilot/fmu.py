@@ -13,12 +13,13 @@ from rov_fmu.autopilot.gains import Autopilot
 from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, OWN_GAINS, SENSORS, STATE, STEP_FILE, law_sources
 from rov_fmu.autopilot.pilot import PLACES
 from rov_fmu.build import model_fmu
+from rov_fmu.c.source import sampled_sources
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import CARD
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
-from rov_fmu.fmu.variables import DeclaredVariable, FmuModel
+from rov_fmu.fmu.variables import FmuModel, VariableList
 from rov_fmu.io.templates import render
 
 _PLUGS = ("pose", "body_velocity", "velocity")
@@ -47,13 +48,8 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     sensors = [one for one in terminals(layout) if one.name in _PLUGS]
     measured = [name for one in sensors for name in one.variables]
     declared = {**layout.pose, **layout.velocities, **layout.over_ground}
-    made = list[DeclaredVariable]()
-
-    def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> int:
-        given = {"display_unit": declaration.display_unit, **rest}
-        about = declaration.description, declaration.unit
-        made.append(DeclaredVariable(name, len(made), *about, causality, variability, **given))
-        return made[-1].value_reference
+    made = VariableList()
+    add = made.add
 
     def put(name: str, text: str, unit: str, start: float, **rest: Any) -> int:
         return add(name, Declaration(unit, text), "input", "continuous", start=start, **rest)
@@ -74,11 +70,7 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     most = {"minimum": 0.0, "maximum": 1.0}
     sag = put("sag", "Part of the largest command that is lost, as by a battery", "1", 0.0, **most)
     inputs = len(made)
-    elapsed = Declaration("s", "Time since the start")
-    add("elapsed", elapsed, "output", "continuous", initial="exact", start=0.0, dependencies={})
-    rate = Declaration("1", "Rate of the time since the start")
-    rest: dict[str, Any] = {"derivative_of": "elapsed", "dependencies": {}, "display_unit": None}
-    add("der(elapsed)", rate, "local", "continuous", initial="calculated", **rest)
+    made.add_clock()
     for name, declaration in layout.commands.items():
         add(name, declaration, "output", "discrete", initial="calculated", dependencies={})
     states = dict.fromkeys(AXES, -1)
@@ -111,7 +103,7 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         "gains": [*gains.values()],
         "sharing": [*map(repr, autopilot.sharing.numbers.tolist())],
     }
-    files = law_sources(LAW_FILE, STEP_FILE) | {"model.h": render("autopilot.h.j2", **given)}
+    files = law_sources(LAW_FILE, STEP_FILE) | sampled_sources() | {"model.h": render("autopilot.h.j2", **given)}
     names = {axis.name: autopilot.lags[axis.name] for axis in autopilot.axes}
     told = ", ".join(f"{name} {lag:.3g} s" for name, lag in names.items())
     summary = f"Autopilot of {vehicle.name}: holds {', '.join(names)} by its thrusters"
@@ -125,7 +117,7 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         *(f"{vehicle.identifier}_autopilot", vehicle.version, vehicle.source, summary, card),
         tuple(made),
         terminals_document(_terminals(layout, sensors)),
-        {**files, "series.c": "/* The autopilot has no series. */\n"},
+        files,
         has_derivatives=False,
         experiment=(10.0, autopilot.step),
     )

@@ -25,9 +25,13 @@ from rov_fmu.io.interrupts import temporary_folder
 _FILES = {path.stem: path for path in Path(__file__).with_name("companions").glob("[a-z]*.py")}
 _COMMON = "rov_fmu_companion"
 """The name of the module that companions have in common, in their FMUs."""
-AUTOPILOT = "autopilot"
-"""The companion in C, which is made for a vehicle (rov_fmu/bridges/autopilot/fmu.py)."""
-COMPANIONS = (AUTOPILOT, *sorted(_FILES))
+AUTOPILOT, SENSORS = "autopilot", "sensors"
+OF_VEHICLES = {
+    AUTOPILOT: "holds the vehicle of `for`, with gains that are made for it",
+    SENSORS: "tells what instruments on the vehicle of `for` measure, with their noise, delays and faults",
+}
+"""The companions in C, which are made for a vehicle, and what they do."""
+COMPANIONS = tuple(sorted({*OF_VEHICLES, *_FILES}))
 """The names of the companions."""
 _PORT = port_of(Point(name="point")).names
 """The names of the members of a vehicle's port, by which a port of a companion fits it: force, place, velocity."""
@@ -35,7 +39,7 @@ _PORT = port_of(Point(name="point")).names
 
 def slave_of(name: str) -> type[Companion]:
     """Return the class of a companion."""
-    if name == AUTOPILOT:
+    if name in OF_VEHICLES:
         return Companion  # it has no class in Python
     found: type[Companion] = getattr(import_module(f"{_common.__package__}.{name}"), name.capitalize())
     return found

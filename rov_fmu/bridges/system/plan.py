@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
-from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS
+from rov_fmu.bridges.system.companion import COMPANIONS, OF_VEHICLES
 from rov_fmu.fmus.description import TIME_LIMIT
 from rov_fmu.io.file_kinds import SYSTEM_PLAN, check_suffix
 from rov_fmu.io.messages import FileError
@@ -67,7 +67,8 @@ class ComponentTable(Strict):
     companion: Literal[COMPANIONS] | None = None  # type: ignore[valid-type]
     """A companion that ships; `rov-fmu system --list` has their variables."""
     held: Symbol | None = Field(None, alias="for")
-    """The component whose vehicle an `autopilot` holds. Its gains are made for this vehicle and for the step."""
+    """The component whose vehicle an `autopilot` holds, with gains for this vehicle and for the step, or `sensors`
+    measure."""
     file: Beside | None = None
     """The table (CSV) of the companion `current`: time (s), z (m), V_N, V_E and perhaps V_D (m/s)."""
     point: Annotated[dict[Symbol, _Position], Field(max_length=_MOST)] = Field({})
@@ -85,8 +86,9 @@ class ComponentTable(Strict):
         for key, needs in (("file", "companion"), ("point", "vehicle")):
             if getattr(self, key) and getattr(self, needs) is None:
                 raise ValueError(f"{key} needs {needs}")
-        if (self.held is not None) != (self.companion == AUTOPILOT):
-            raise ValueError('for = "component" belongs to companion = "autopilot", which needs it')
+        if (self.held is not None) != (self.companion in OF_VEHICLES):
+            names = " or ".join(f'"{name}"' for name in OF_VEHICLES)
+            raise ValueError(f'for = "component" belongs to companion = {names}, which needs it')
         return self
 
 

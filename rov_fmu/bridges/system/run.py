@@ -14,6 +14,7 @@ from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
 from rov_fmu.bridges.system.part import SystemFmu
+from rov_fmu.bridges.system.sensors import TRUE
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmus.description import TIME_LIMIT, budget
 from rov_fmu.fmus.instance import Array, RunError
@@ -172,19 +173,26 @@ def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[st
 
 
 def deviations(structure: SystemStructure, read: Sequence[Name], rows: Array) -> dict[Name, Array]:
-    """Return how far each place and angle is from where an autopilot holds it, by its name; NaN while none does."""
+    """Return how far each place and angle is from where an autopilot holds it, by its name; NaN while none does.
+
+    Where sensors tell it the autopilot, it is how far the truth is."""
     columns = {name: n for n, name in enumerate(read)}
     sources = {one.end: one.start for one in structure.connections if one.start in columns}
     found: dict[Name, Array] = {}
+
+    def told(component: str, name: str) -> Name | None:
+        source = sources.get((component, name))
+        return sources.get((source[0], f"{TRUE}{source[1]}"), source) if source else None
+
     for component, part in structure.parts.items():
 
         def series(name: str, component: str = component, part: SystemFmu = part) -> Array:
-            if source := sources.get((component, name)):
+            if source := told(component, name):
                 return rows[:, columns[source]]
             return np.full(len(rows), float(structure.values[component].get(name, part.variables[name].start)))
 
         for name, axis in _AIMS.items():
-            sensor = sources.get((component, name))
+            sensor = told(component, name)
             if sensor and {f"mode_{axis}", f"ref_{name}"} <= part.variables.keys():
                 change = series(name) - series(f"ref_{name}")
                 if part.variables[name].unit == "rad":

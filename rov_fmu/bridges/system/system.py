@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_model
-from rov_fmu.bridges.system.companion import Rows, companion, lack, levels_of, slave_of, timed_rows
+from rov_fmu.bridges.system.companion import SENSORS, Rows, companion, lack, levels_of, slave_of, timed_rows
 from rov_fmu.bridges.system.companions._common import Companion
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,
@@ -21,6 +21,7 @@ from rov_fmu.bridges.system.connections import (
 )
 from rov_fmu.bridges.system.part import SystemFmu
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
+from rov_fmu.bridges.system.sensors import sensors_model
 from rov_fmu.bridges.system.ssp import Component, System
 from rov_fmu.build import model_fmu
 from rov_fmu.equation.catalogue import before_name
@@ -113,7 +114,7 @@ def _parts(plan: SystemPlan, path: Path, served: Served) -> dict[str, SystemFmu]
                     )
                     part = SystemFmu.open(Path(table.companion), make(), is_ours=True, make=make)
                 else:
-                    held = _autopilot(name, plan, path) if table.held else None
+                    held = _of_vehicle(name, plan, path) if table.held else None
                     part = _described(held or motion_model(_vehicle(name, table, path)))
                 ready[kind] = part.with_ports(table.port)
         except FileError as error:
@@ -197,8 +198,13 @@ def _slave(plan: SystemPlan, component: str) -> type[Companion]:
     return slave_of(table.companion) if table and table.companion else Companion
 
 
-def _autopilot(name: str, plan: SystemPlan, path: Path) -> FmuModel:
-    """Return the model of the autopilot of a component's vehicle, for the step of the plan. Raises FileError."""
+def of_vehicle(companion: str, vehicle: Vehicle, step: float) -> FmuModel:
+    """Return the model of a companion that is made for a vehicle and a step, s. Raises InputError."""
+    return sensors_model(vehicle, step) if companion == SENSORS else autopilot_model(autopilot_of(vehicle, step))
+
+
+def _of_vehicle(name: str, plan: SystemPlan, path: Path) -> FmuModel:
+    """Return the model of the companion of a component's vehicle, for the step of the plan. Raises FileError."""
     held = plan.component[name].held or ""
     table = plan.component.get(held)
     if not table or not table.vehicle:
@@ -206,7 +212,7 @@ def _autopilot(name: str, plan: SystemPlan, path: Path) -> FmuModel:
         reason = f"must be a component that has a vehicle{only(held, has)}"
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', reason, held)}")
     try:
-        return autopilot_model(autopilot_of(_vehicle(held, table, path), plan.step))
+        return of_vehicle(plan.component[name].companion or "", _vehicle(held, table, path), plan.step)
     except InputError as error:
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', str(error), held)}") from error
 

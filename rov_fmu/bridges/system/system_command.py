@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from rov_fmu.autopilot.gains import autopilot_of
-from rov_fmu.bridges.autopilot.fmu import autopilot_model
-from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_of
+from rov_fmu.autopilot.gains import STEP
+from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, OF_VEHICLES, lack, slave_of
 from rov_fmu.bridges.system.companions._common import Variables
 from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
@@ -17,7 +16,7 @@ from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import held_words, passed, picture, recorded_names, run_system, system_csv
 from rov_fmu.bridges.system.ssp import ssp_content
-from rov_fmu.bridges.system.system import elsewhere, files_of, made, unconnected
+from rov_fmu.bridges.system.system import elsewhere, files_of, made, of_vehicle, unconnected
 from rov_fmu.fmu.archive import is_unchanged
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM
@@ -28,7 +27,6 @@ from rov_fmu.report.progress import Parts, parts
 from rov_fmu.vehicle.shipped import find_vehicle, named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-_AUTOPILOT = "holds the vehicle of `for`, with gains that are made for it"
 _MOST_SHOWN = 10
 """The most variables of the table of what half the step changes."""
 
@@ -112,27 +110,28 @@ def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
                 yield from (file, *load_vehicle(file).files)
 
 
-def _of_autopilot() -> Variables:
-    """Return the inputs of the autopilot of the vehicle that ships first, and its gains in depth."""
-    model = autopilot_model(autopilot_of(load_vehicle(find_vehicle("videoray"))))
+def _for_one(companion: str) -> Variables:
+    """Return the variables of a companion for the vehicle that ships first; of gains, those in depth."""
+    model = of_vehicle(companion, load_vehicle(find_vehicle("videoray")), STEP)
     return {
         one.name: (one.causality, one.start or 0.0, one.unit, one.description)
         for one in model.variables
-        if one.causality in ("input", "output") or (one.name.endswith("_w") and one.causality == "parameter")
+        if one.causality in ("input", "output")
+        or (one.causality == "parameter" and (companion != AUTOPILOT or one.name.endswith("_w")))
     }
 
 
 def companions() -> dict[str, str]:
     """Return what each companion is, by its name."""
-    return {name: _AUTOPILOT if name == AUTOPILOT else slave_of(name).description for name in COMPANIONS}
+    return {name: OF_VEHICLES.get(name) or slave_of(name).description for name in COMPANIONS}
 
 
 def list_companions() -> None:
     """Print the companions with their variables."""
     for name, words in companions().items():
         title = f"{name}: {words}"
-        if name == AUTOPILOT:
-            title, variables = f"{title}, here for a VideoRay", _of_autopilot()
+        if name in OF_VEHICLES:
+            title, variables = f"{title}, here for a VideoRay", _for_one(name)
         else:
             slave = slave_of(name)(instance_name=name)
             variables = slave.variables

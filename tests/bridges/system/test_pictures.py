@@ -12,6 +12,7 @@ from rov_fmu.bridges.autopilot.fmu import autopilot_model
 from rov_fmu.bridges.system import run
 from rov_fmu.bridges.system.connections import SystemStructure, connected
 from rov_fmu.bridges.system.part import SystemFmu
+from rov_fmu.bridges.system.sensors import sensors_model
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.system.fmus import described, described_model
@@ -54,6 +55,16 @@ def test_what_is_held_is_told_from_its_aims(held: SystemStructure) -> None:
     assert run.held_words(held, read, rows) == words
     free = SystemStructure(held.parts, {**held.values, "pilot": {"mode_w": 1.0, "mode_r": 0.0}}, held.connections)
     assert run.held_words(free, read, rows) == ""
+
+
+def test_with_sensors_it_is_the_truth_that_is_told_from_its_aim(held: SystemStructure) -> None:
+    sensors = SystemFmu.open(Path("s"), described_model(sensors_model(ROV, 0.1), []), is_ours=True)
+    parts = {**held.parts, "sensors": sensors}
+    lines = [("rov.pose", "sensors.true_pose"), ("sensors.pose", "pilot.pose"), ("pilot.thrusters", "rov.thrusters")]
+    system = SystemStructure(parts, held.values, [c for ends in lines for c in connected(*ends, 1.0, parts)])
+    found = run.deviations(system, *motion(system))
+    assert found.keys() == {("rov", "z"), ("rov", "psi")}
+    np.testing.assert_allclose(found["rov", "z"], [-10.0, -1.0, -0.04, 0.01, 0.0], atol=1e-12)
 
 
 def test_the_plot_has_the_deviations_first_and_everything_once(

@@ -94,7 +94,7 @@ def told(text: str, capsys: Capsys) -> list[str]:
     return without_progress(capsys.readouterr().err).splitlines()
 
 
-PILOT = 'for = "component" belongs to companion = "autopilot", which needs it'
+PILOT = 'for = "component" belongs to companion = "autopilot" or "sensors", which needs it'
 WRONG = {
     "a component that is not there": (LAST, '["rovv.y", "b.u"],', "there is no component 'rovv', only rov, tether"),
     "a variable that is not there": (LAST, '["a.yy", "b.u"],', "a: the FMU has no variable or terminal 'yy'"),
@@ -439,7 +439,10 @@ def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
         connected("rov.point_bow", "rov.point_bow", 1.0, has)
 
 
-@pytest.mark.parametrize("name", companions.COMPANIONS[1:])
+IN_PYTHON = [name for name in companions.COMPANIONS if name not in companions.OF_VEHICLES]
+
+
+@pytest.mark.parametrize("name", IN_PYTHON)
 def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     content = companions.companion(name)
     assert companions.companion(name) == content
@@ -460,7 +463,9 @@ def test_the_list_names_every_companion_with_its_variables(capsys: Capsys) -> No
     assert main(["system", "--list"]) == 0
     printed = capsys.readouterr().out
     assert "autopilot: holds the vehicle of `for`" in printed
-    for name in companions.COMPANIONS[1:]:
+    assert "sensors: tells what instruments on the vehicle of `for` measure" in printed
+    assert "noise_velocity" in printed
+    for name in IN_PYTHON:
         assert f"{name}: {companions.slave_of(name).description}" in printed
         assert all(variable in printed for variable in companions.slave_of(name)(instance_name=name).variables)
 
