@@ -15,6 +15,7 @@ enum { AXES = 6, HEAVE_AXIS = 2, ROLL_AXIS = 3, YAW_AXIS = 5, MOST_THRUSTERS = 3
 #define STICK 0.0
 #define RATE 1.0
 #define PLACE 2.0
+#define STOP 3.0 /* in the place of PLACE while the place is not known: a rate of 0, over ground */
 #define PI 3.141592653589793
 
 /* A thruster: its output for the demands (B+, or the factors of a frame), what it gives along the axes (B), and the rows
@@ -277,8 +278,8 @@ static void autopilot_step(const loop_gains gains[AXES], const sharing *share, l
     const double north = off[0], east = off[1], ahead = c * now->ground[0] + d * now->ground[1];
     off[0] = c * north + d * east; /* over ground, ahead and to starboard */
     off[1] = c * east - d * north;
-    rate[0] = mode[0] == PLACE ? ahead : rate[0];
-    rate[1] = mode[1] == PLACE ? c * now->ground[1] - d * now->ground[0] : rate[1];
+    rate[0] = mode[0] >= PLACE ? ahead : rate[0];
+    rate[1] = mode[1] >= PLACE ? c * now->ground[1] - d * now->ground[0] : rate[1];
     rate[HEAVE_AXIS] = now->ground[2];
     double level[3] = {0.0};
     for (int a = 0; a < AXES; a++) {

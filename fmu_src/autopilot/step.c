@@ -4,6 +4,9 @@
 
 enum { N_STATE = sizeof(loop_state) / sizeof(double), N_GAINS = sizeof(loop_gains) / sizeof(double) };
 
+/* The inputs that say whether the place and the rate of an axis are measured: those of position, depth, velocity and attitude. */
+static const int PLACE_BY[AXES] = {0, 0, 1, 3, 3, 3}, RATE_BY[AXES] = {2, 2, 1, 3, 3, 3};
+
 typedef struct {
     loop_gains gains[AXES];
 } model_numbers;
@@ -45,6 +48,7 @@ static int delayed_step(double at[], const model_numbers *n, delay_line *line, d
 {
     double values[sizeof(sensor_values) / sizeof(double)], mode[AXES], aim[AXES], demand[AXES];
     double commands[MOST_THRUSTERS], outputs[MOST_THRUSTERS];
+    double held[AXES];
     loop_state state[AXES];
     sensor_values now;
     (void)line, (void)t, (void)heading;
@@ -54,8 +58,11 @@ static int delayed_step(double at[], const model_numbers *n, delay_line *line, d
     angles_of(at, values + ROLL_AXIS);
     memcpy(&now, values, sizeof now);
     for (int a = 0; a < AXES; a++) {
-        mode[a] = floor(value_at(at, AIM_AT[a][0]) + 0.5);
-        aim[a] = value_at(at, AIM_AT[a][1 + (int)mode[a]]);
+        const double asked = floor(value_at(at, AIM_AT[a][0]) + 0.5);
+        const bool has_place = at[FIRST_VALID + PLACE_BY[a]] > 0.5, has_rate = at[FIRST_VALID + RATE_BY[a]] > 0.5;
+        mode[a] = !has_rate ? STICK : asked == PLACE && !has_place ? STOP : asked;
+        held[a] = mode[a] == asked ? 1.0 : 0.0;
+        aim[a] = mode[a] == STOP ? 0.0 : value_at(at, AIM_AT[a][1 + (int)mode[a]]);
         memset(&state[a], 0, sizeof state[a]);
         if (STATE_AT[a] >= 0) {
             memcpy(&state[a], at + STATE_AT[a], sizeof state[a]);
@@ -69,6 +76,7 @@ static int delayed_step(double at[], const model_numbers *n, delay_line *line, d
     for (int a = 0; a < AXES; a++) {
         if (STATE_AT[a] >= 0) {
             memcpy(at + STATE_AT[a], &state[a], sizeof state[a]);
+            at[HELD_AT[a]] = held[a];
         }
     }
     next[0] = at[FIRST_STATE] + h;

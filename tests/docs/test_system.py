@@ -164,8 +164,8 @@ def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.Mo
     assert [*system.unconnected(plan, found)] == [
         "rov: nothing is connected to X_ext, Z_ext and N_ext, which keep their start values",
         "tether: nothing is connected to y_top, z_top, vg_N_top, vg_E_top and vg_D_top, which keep their start values",
-        "autopilot: nothing is connected to mode_u, ref_u, ref_x, stick_w, ref_w, stick_r, ref_r and sag, which keep "
-        "their start values",
+        "autopilot: nothing is connected to mode_u, ref_u, ref_x, stick_w, ref_w, stick_r, ref_r, sag "
+        "and 4 others, which keep their start values",
     ]
 
 

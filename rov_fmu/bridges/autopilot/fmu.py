@@ -24,6 +24,13 @@ from rov_fmu.io.templates import render
 
 _PLUGS = ("pose", "body_velocity", "velocity")
 """The terminals of the vehicle that are the sensors."""
+VALID = {
+    "valid_position": "position",
+    "valid_depth": "depth, with the velocity downward,",
+    "valid_velocity": "velocity",
+    "valid_attitude": "attitude, with its rates,",
+}
+"""The inputs that say which measurements are valid, with what they are of. So are they in fmu_src/autopilot/step.c."""
 _MODES = "0: stick, 1: rate, 2: place or angle"
 
 
@@ -69,6 +76,9 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         ]  # fmt: skip
     most = {"minimum": 0.0, "maximum": 1.0}
     sag = put("sag", "Part of the largest command that is lost, as by a battery", "1", 0.0, **most)
+    valid = len(made)
+    for flag, words in VALID.items():
+        put(flag, f"1: the {words} is measured; 0: it is old", "1", 1.0, display_unit=None, **most)
     inputs = len(made)
     made.add_clock()
     for name, declaration in layout.commands.items():
@@ -81,6 +91,11 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
             for n in range(STATE)
         ]
         states[axis] = first
+    held = dict.fromkeys(AXES, -1)
+    for axis in autopilot.axes:
+        words = f"1: {axis.name} does what its mode asks for; 0: it lacks a valid measurement, and a lower mode acts"
+        given = {"initial": "calculated", "dependencies": {}, "display_unit": None}
+        held[axis] = add(f"is_held_{axis.velocity}", Declaration("1", words), "output", "discrete", **given)
     gains = {axis: [-1] * len(GAINS) for axis in AXES}
     for axis in autopilot.axes:
         for n, name in enumerate(OWN_GAINS):
@@ -95,6 +110,8 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
         "inputs": inputs,
         "commands": len(layout.commands),
         "sag": sag,
+        "valid": valid,
+        "held": [*held.values()],
         "quaternion": places.get(QUATERNION[0], -1),
         "variables": len(made),
         "sensors": [places.get(name, -1) for name in SENSORS],
@@ -141,7 +158,8 @@ def _length(axis: Axis) -> str:
 
 def _terminals(layout: Layout, sensors: Sequence[Terminal]) -> list[Terminal]:
     commands = next(one for one in terminals(layout) if one.name == "thrusters")
-    return [*(replace(one, causality="input") for one in sensors), replace(commands, causality="output")]
+    valid = Terminal("valid", "input", "bus", "Which measurements are valid", tuple(VALID))
+    return [*(replace(one, causality="input") for one in sensors), valid, replace(commands, causality="output")]
 
 
 def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, fmi: int = 2) -> bytes:

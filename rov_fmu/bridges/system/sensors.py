@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+from rov_fmu.bridges.autopilot.fmu import VALID
 from rov_fmu.c.source import sampled_sources
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import Declaration
@@ -126,9 +127,8 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
     for name, one in _INSTRUMENTS.items():
         of_sample = Declaration("s", f"When the sample was taken that the {one.words} tells")
         made.add(f"time_of_{name}", of_sample, "output", "continuous", **given)
-    valid = len(made)
-    flags = [f"valid_{name}" for name in _INSTRUMENTS]
-    for flag, one in zip(flags, _INSTRUMENTS.values(), strict=True):
+    flags = len(made)
+    for flag, one in zip(VALID, _INSTRUMENTS.values(), strict=True):
         words = Declaration("1", f"1: the {one.words} measures, 0: it tells its last sample")
         made.add(flag, words, "output", "continuous", display_unit=None, **given)
     parameters = len(made)
@@ -136,7 +136,7 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
         bounds = {"start": start, "minimum": low, "maximum": high, "display_unit": None}
         made.add(name, Declaration(unit, words), "parameter", "tunable", initial="exact", **bounds)
     known = [one.name for one in made if one.causality in ("input", "parameter")]
-    places = {"inputs": inputs, "times": times, "valid": valid, "parameters": parameters, "variables": len(made)}
+    places = {"inputs": inputs, "times": times, "valid": flags, "parameters": parameters, "variables": len(made)}
     of = {key: [places_of.get(name, -1) for name in CHANNELS] for key, places_of in (("real", true), ("told", told))}
     summary = f"Sensors of {vehicle.name}: what its instruments tell, with noise, delays and faults"
     card = f"What it is\n- {summary}.\n- The start values are those of a USBL, a Bar30, a DVL A50 and an MTi-30.\n"
@@ -146,10 +146,11 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
         for names in [one.variables]
     ]
     electric = Terminal("electric", "input", "bus", "Electric current of the thrusters", ("electric_current",))
+    valid = Terminal("valid", "output", "bus", "Which measurements are valid", tuple(VALID))
     return FmuModel(
         *(f"{vehicle.identifier}_sensors", vehicle.version, vehicle.source, summary, card),
         tuple(made),
-        terminals_document([*inward, electric, *plugs, valid_terminal(tuple(flags), "output")]),
+        terminals_document([*inward, electric, *plugs, valid]),
         sampled_sources()
         | {
             "model.h": render("sensors.h.j2", **places, **of),
@@ -157,10 +158,5 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
         },
         has_derivatives=False,
         experiment=(60.0, step),
-        parameters_of=dict.fromkeys([*measured, *flags], known),
+        parameters_of=dict.fromkeys([*measured, *VALID], known),
     )
-
-
-def valid_terminal(names: tuple[str, ...], causality: str) -> Terminal:
-    """Return the terminal that says which measurements are valid."""
-    return Terminal("valid", causality, "bus", "Which measurements are valid", names)
