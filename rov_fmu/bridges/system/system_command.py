@@ -8,10 +8,11 @@ import numpy as np
 from rich.table import Table
 
 from rov_fmu.autopilot.gains import STEP
-from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, OF_VEHICLES, lack, slave_of
+from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, OF_VEHICLES, SENSORS, lack, slave_of
 from rov_fmu.bridges.system.companions._common import Variables
 from rov_fmu.bridges.system.connections import SystemStructure
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
+from rov_fmu.bridges.system.log import sensor_log
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import held_words, passed, picture, recorded_names, run_system, system_csv
@@ -32,7 +33,7 @@ _MOST_SHOWN = 10
 
 
 def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
-    """Write the SSP of a plan; `runs`: run it, and write the motion as .csv and .svg beside it.
+    """Write the SSP of a plan; `runs`: run it, and write the motion as .csv and .svg beside it, and logs of sensors.
 
     Raises SystemPlanError, FileError, BuildError, WriteError. After a failure, no file is written.
     """
@@ -44,6 +45,12 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
     targets = [(output, SYSTEM), *((file, "") for file in results)]
     check_targets(targets, [path], force=force, is_ours=is_ours)
     plan, half, changes = load_system_plan(path), None, None
+    logs = {
+        name: output.with_name(f"{output.stem}_{name}.csv")
+        for name, table in plan.component.items()
+        if runs and table.companion == SENSORS
+    }
+    targets += [(file, "") for file in logs.values()]
     check_targets(targets, _inputs(plan, path), force=force, is_ours=is_ours)
     with parts() as shown:
         structure = made(plan, path, lambda name: shown.begin(f"making {name}"))
@@ -58,8 +65,10 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
                 shown.print(f"warning: {warning}")
             if words := held_words(structure, read, rows):
                 shown.print(words)
+            values = dict(zip(read, rows.T, strict=True))
             if passed(structure):
-                half, changes = _half_step(structure, plan, path, dict(zip(read, rows.T, strict=True)), shown)
+                half, changes = _half_step(structure, plan, path, values, shown)
+            outputs += [Output(file, sensor_log(structure, name, values, plan.step)) for name, file in logs.items()]
             motion, plot = results
             drawing = picture(structure, read, plan.plot, plan.step, rows)
             outputs += [

@@ -1,6 +1,7 @@
 """The companion `sensors` against the truth, the statistics that its parameters tell, and the same noise in Python."""
 
 from collections.abc import Mapping
+from io import StringIO
 from math import exp, sqrt
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from scipy.stats import kstest, kurtosis
 
 from rov_fmu.bridges.system.sensors import CHANNELS, sensors_model
 from rov_fmu.build import model_fmu
+from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmus.fmu import Fmu
 from rov_fmu.tank.arrays import Array
@@ -253,3 +255,57 @@ def test_a_state_that_is_restored_goes_on_with_the_same_samples(
     assert steps(100) == before
     pilot.terminate()
     pilot.freeInstance()
+
+
+# ---- The log of a dive -----------------------------------------------------------------------------------------------
+
+DIVE = """
+step = 0.02
+stop_time = 2.0
+connect = [
+  ["rov.pose", "sensors.true_pose"], ["rov.velocity", "sensors.true_velocity"],
+  ["rov.body_velocity", "sensors.true_body_velocity"],
+  ["sensors.pose", "autopilot.pose"], ["sensors.velocity", "autopilot.velocity"],
+  ["sensors.body_velocity", "autopilot.body_velocity"], ["sensors.valid", "autopilot.valid"],
+  ["autopilot.thrusters", "rov.thrusters"],
+]
+[component.rov]
+vehicle = "bluerov2_heavy"
+start = { z = 10, psi_0 = 2.0 }
+[component.sensors]
+companion = "sensors"
+for = "rov"
+start = { lost_from_velocity = 1.0, lost_for_velocity = 5.0 }
+[component.autopilot]
+companion = "autopilot"
+for = "rov"
+start = { stick_u = 0.5, mode_r = 1, ref_r = 0.5 }
+"""
+
+
+def test_a_run_writes_a_log_whose_samples_are_those_of_the_dive(tmp_path: Path) -> None:
+    plan = tmp_path / "dive.toml"
+    plan.write_text(DIVE, encoding="utf-8")
+    assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == 0
+    motion = np.genfromtxt(tmp_path / "my.csv", delimiter=",", names=True, deletechars="")
+    header, _, rows = (tmp_path / "my_sensors.csv").read_text(encoding="utf-8").partition("\n")
+    log = dict(zip(header.split(","), np.genfromtxt(StringIO(rows), delimiter=",").T, strict=True))
+    assert (log["time [s]"] == motion["time"]).all()
+    for n in range(1, 9):
+        assert (log[f"u_{n} [1]"] == motion[f"autopilot.u_{n}"]).all()
+    times = {name: motion["time"][np.isfinite(values)] for name, values in log.items()}
+    np.testing.assert_allclose(np.diff(times["north velocity [m/s]"]), 0.2)
+    np.testing.assert_allclose(np.diff(times["depth [m]"]), 0.06, atol=0.021)  # 20 per second, in steps of 0.02 s
+    assert times["east velocity [m/s]"][-1] == pytest.approx(0.8), "what is not valid is empty"
+    for name, truth, noise in (
+        ("depth [m]", "z", 0.05),
+        ("north velocity [m/s]", "vg_N", 0.03),
+        ("yaw velocity [rad/s]", "r", 0.005),
+        ("heading [rad]", "psi", 0.06),
+        ("roll angle [rad]", "phi", 0.02),
+        ("pitch angle [rad]", "theta", 0.02),
+    ):
+        told = np.isfinite(log[name])
+        assert np.abs(log[name] - motion[f"rov.{truth}"])[told].max() < noise, name
+    assert np.ptp(motion["rov.psi"]) > 0.5
+    assert np.ptp(motion["rov.vg_N"]) > 0.3
