@@ -194,7 +194,7 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
         (drawn(12, drifts_above, start=0.05, load=-0.5), [(0.0, 22.0)], [(1.0, 19.5)]),
         (drawn(11, stuck_below, dives_to(7.0), load=-0.5), [(0.0, 110.0)], [(63.0, 79.0)]),
-        (drawn(14, brought_below, dives_to(9.0)), [(59.0, 84.0)], [(61.0, 79.0)]),
+        (drawn(16, brought_below, dives_to(9.0)), [(59.0, 84.0)], [(60.0, 79.0)]),
         (drawn(10, rises_beyond, start=4.0, zeroed=4.0), [(0.0, 110.0)], [(14.0, 17.5)]),
     ],
     ids=[
