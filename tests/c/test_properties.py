@@ -154,7 +154,7 @@ def test_a_run_is_the_same_in_pieces_and_in_lanes(name: str) -> None:
 
 @pytest.mark.parametrize(
     "axes",
-    [pytest.param(axes, marks=pytest.mark.weekly if n % 16 else pytest.mark.long) for n, axes in enumerate(SUBSETS, 1)],
+    [pytest.param(axes, marks=pytest.mark.weekly if n % 32 else pytest.mark.long) for n, axes in enumerate(SUBSETS, 1)],
 )
 def test_a_run_of_any_vehicle_is_the_same_in_pieces_and_in_lanes(axes: str) -> None:
     """63 subsets of the axes. The engine of each is compiled."""

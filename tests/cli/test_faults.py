@@ -34,7 +34,7 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 @pytest.mark.parametrize(
     ("keys", "moments"),
     [
-        pytest.param([("identify", "output"), ("identify", "report")], 3, marks=pytest.mark.long),
+        pytest.param([("identify", "output"), ("identify", "report")], 1, marks=pytest.mark.long),
         pytest.param([("identify", "output"), ("identify", "report")], 20, marks=pytest.mark.weekly),
         pytest.param([("build", "output")], 20, marks=pytest.mark.weekly),
     ],

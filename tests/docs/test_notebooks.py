@@ -59,7 +59,7 @@ def test_the_filter_is_consistent() -> None:
         assert covered[False][found["PLACE"]["u"]] < covered[True][found["PLACE"]["u"]] - 0.01
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_controller_holds_station() -> None:
     """All drawn vehicles turn into the current and stay within 8 cm."""
     with namespace_of("controller.md") as found:

@@ -96,7 +96,7 @@ def test_otter(otter: Identification) -> None:
     assert np.std(off) == pytest.approx(float(scatter), rel=0.3)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_dive(harbour: Identification) -> None:
     """Of the intervals of 95 %, at most two miss the truth, and predictions stay inside their bands."""
     assert len(harbour.vehicle.intervals) >= 14
@@ -153,7 +153,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     assert stopped["stop"].trajectories([0]).set_index("t").u[30.0] < 1e-3, "it has stopped"
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_learned_policy_and_the_autopilot_hold_station_as_the_page_says(capsys: Capsys) -> None:
     hold_station.main()
     policy, autopilot = map(float, re.findall(r"-\d+\.\d", capsys.readouterr().out))

@@ -38,7 +38,7 @@ def held(rov: Vehicle, **values: float) -> State:
 # ---- Thrust ----
 
 
-@often("cases", 25, 300)
+@often("cases", 25, 100, 300)
 def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -> None:
     """They agree within the rounding of the largest term, also at rest and on the edges of the dead band."""
     rng = random.Random(6)

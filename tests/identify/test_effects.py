@@ -28,6 +28,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import KEPT, Identification, Interval
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
+from tests.often import spread
 from tests.report.results import without_findings
 from tests.vehicles import VIDEORAY
 
@@ -404,8 +405,7 @@ def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Pat
         assert beta.interval[1] / beta.interval[0] < 1.08  # 1 % of a speed and 1 % of a time are always unknown
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("aside", [0.3, 0.0])
+@pytest.mark.parametrize("aside", spread([0.3, 0.0], (), [0.3]))
 def test_a_velocity_sensor_beside_the_origin_is_found(aside: float, tmp_path: Path) -> None:
     """A sensor to starboard measures u - r y."""
     random, step = np.random.default_rng(2), 0.1

@@ -33,7 +33,7 @@ def _plan(folder: Path) -> tuple[Path, list[str]]:
     return path, ["study", str(path), "-o", str(folder / "results")]
 
 
-@often("number", 10_000, 100_000)
+@often("number", 10_000, 20_000, 100_000)
 @pytest.mark.parametrize("file", [_vehicle, _rov, _plan])
 def test_many_unknown_tables(
     file: Callable[[Path], tuple[Path, list[str]]], number: int, tmp_path: Path, capsys: Capsys

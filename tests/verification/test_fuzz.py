@@ -9,7 +9,6 @@ import pytest
 
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import read_toml
-from tests.often import spread
 from verification.fuzzing import __main__ as command
 from verification.fuzzing.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from verification.references.c_programs import clang
@@ -39,7 +38,7 @@ MISSING = {
 
 
 @pytest.mark.parametrize("name", ["videoray", "videoray_autopilot"])
-@pytest.mark.parametrize("fmi", spread([2, 3], (), [3]))
+@pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.weekly)])
 def test_the_corpus_reaches_every_function(tmp_path: Path, corpus: Path, name: str, fmi: int) -> None:
     """And finds nothing. `python -m verification.fuzzing` begins with the corpus, for every vehicle and autopilot."""
     build_target(_sources(name, fmi), tmp_path / "target", fmi)

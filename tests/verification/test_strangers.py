@@ -134,7 +134,7 @@ def test_of_a_stranger_only_what_is_true_is_said(seed: int, surge: str, yaw: str
     assert not any(axis.is_off() for axis in one.axes if axis.word == "good")
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_right_model_is_good_and_nothing_is_answered_beyond_a_limit_of_the_commands() -> None:
     """In heave alone. The vehicle file goes on beyond the limit of 45 %, and the thrusters do not."""
     for kind, within, most, causes in (("as modelled", 0.5, 1.0, ()), ("limit", 0.3, 0.45, (("command limit", True),))):

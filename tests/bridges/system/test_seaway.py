@@ -291,7 +291,7 @@ def test_a_tether_is_moved_by_the_sea_of_a_plan(tmp_path: Path) -> None:
     assert "_p10" not in plot, "its nodes have no lines"
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_held_vehicle_keeps_station_up_to_the_sea_of_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:

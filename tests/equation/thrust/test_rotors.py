@@ -11,6 +11,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.parts import Curve
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import in_engine
+from tests.often import spread
 from tests.vehicles import (
     SIX,
     VEHICLES,
@@ -26,7 +27,6 @@ from tests.vehicles import (
 from verification.references import rigid_vehicle
 from verification.references.rigid_vehicle import compared, places
 
-WEEKLY = pytest.mark.weekly
 TOLERANCE = 5e-12
 FORCES = {"four axes": VEHICLES["drag by direction, coupled, late"], "six axes": SIX}
 """Vehicles with dead bands, reverse thrust and drag by direction. That with six axes also loses thrust with speed."""
@@ -80,9 +80,8 @@ def test_the_motion_is_that_of_dop853_between_reversals() -> None:
         assert error(rov, rov.step(inputs, state, h), expected) <= 1e-10
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ROTORS)
-@pytest.mark.parametrize("h", [1e-3, 1e-2, 1.0, pytest.param(100.0, marks=WEEKLY)])
+@pytest.mark.parametrize("h", spread([1e-3, 1e-2, 1.0, 100.0], (), [1e-2]))
 def test_a_step_with_reversals_of_rotors_and_velocities_is_exact(name: str, h: float) -> None:
     rov = (SLOW if h > 10.0 else ROTORS)[name]
     rov = rov.with_(**{rov.layout.health[rov.layout.thrusters[0].name]: 0.8})

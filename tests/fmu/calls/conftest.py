@@ -17,12 +17,12 @@ def modes_of(version: int) -> list[tuple[int, str]]:
     return fmi.EVERY_MODE if version == 2 else fmi3.EVERY_MODE
 
 
-def of_both_versions(two: str, three: str, is_two_long: bool = False) -> Any:
+def of_both_versions(two: str, three: str, is_two_weekly: bool = False) -> Any:
     """Return a fixture: the FMUs of FMI 2.0 and FMI 3.0, loaded for one file of tests, whose folders two others return.
 
-    If `is_two_long`, the tests of FMI 2.0 are long.
+    If `is_two_weekly`, the tests of FMI 2.0, which repeat those of FMI 3.0, run once a week.
     """
-    marks = pytest.mark.long if is_two_long else ()
+    marks = pytest.mark.weekly if is_two_weekly else ()
 
     @pytest.fixture(scope="module", params=[pytest.param(2, marks=marks), 3], ids="FMI {}.0".format)
     def fmu(request: pytest.FixtureRequest) -> fmi.Fmu:

@@ -30,7 +30,7 @@ ANGLES = ("phi", "theta", "psi")
 START = {"phi_0": 0.3, "theta_0": -0.8, "psi_0": 8.0}
 
 
-fmu = of_both_versions("six_dir", "outside3_dir", is_two_long=True)
+fmu = of_both_versions("six_dir", "outside3_dir", is_two_weekly=True)
 
 
 def complete(rov: AnyInstance, status: int = OK) -> None:

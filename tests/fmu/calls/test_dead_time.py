@@ -20,13 +20,14 @@ from tests.equation.thrust.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, MODEL_EXCHANGE, WARNING, WITH_EVENTS, AnyInstance, Fmu, reals
 from tests.fmu.calls.conftest import modes_of, of_both_versions
 from tests.fmu.calls.test_state_bytes import checksum
+from tests.often import spread
 
 T_d = ROV["T_d"]
 ALL_ON = dict.fromkeys(ROV.layout.commands, 0.5)
 DELAYED = {f"delayed_{name}": value for name, value in ALL_ON.items()}
 
 
-fmu = of_both_versions("thrust_dir", "thrust3_dir", is_two_long=True)
+fmu = of_both_versions("thrust_dir", "thrust3_dir", is_two_weekly=True)
 
 
 def delayed(rov: AnyInstance) -> dict[str, float]:
@@ -174,7 +175,7 @@ class Commands:
                 self.acting, self.sent = commands, self.sent[1:]
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 10))])
+@pytest.mark.parametrize("seed", spread(range(10), [0], [1, 2]))
 def test_only_commands_that_stand_when_a_step_is_complete_are_sent(fmu: Fmu, seed: int) -> None:
     """A solver tries steps, rejects some, completes others, and goes back to events inside them."""
     rng = random.Random(seed)

@@ -55,7 +55,7 @@ def separate_steps(fmu3: fmi3.Fmu, times: list[float], control: Control) -> list
 
 
 @pytest.mark.parametrize("early", [False, True])
-@pytest.mark.parametrize("h", [0.3 * PIECE, PIECE, 1.5 * PIECE, 1e-3, 0.1, pytest.param(5.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("h", [0.3 * PIECE, PIECE, 1.5 * PIECE, 1e-3, 0.1, pytest.param(5.0, marks=pytest.mark.weekly)])
 def test_the_callback_is_called_at_the_ends_of_a_step_and_every_tenth_of_a_millisecond(
     fmu3: fmi3.Fmu, h: float, early: bool
 ) -> None:

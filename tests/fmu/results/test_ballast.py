@@ -29,7 +29,7 @@ CHANGES = BALLAST | {"health_a": 0.3, "health_b": 0.0}
 IMPOSSIBLE = {"m_rov": 2.0 * ROV["m_rov"], "z_G": 50.0}
 
 
-fmu = of_both_versions("six_dir", "outside3_dir", is_two_long=True)
+fmu = of_both_versions("six_dir", "outside3_dir", is_two_weekly=True)
 
 
 def _restarted(folder: Path) -> None:

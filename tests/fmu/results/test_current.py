@@ -11,7 +11,7 @@ from tests.fmu.calls.conftest import of_both_versions
 from tests.vehicles import HEAVY, a_vehicle, passed
 
 ROV = a_vehicle(passed(HEAVY))
-fmu = of_both_versions("passed_dir", "passed3_dir", is_two_long=True)
+fmu = of_both_versions("passed_dir", "passed3_dir", is_two_weekly=True)
 TIMES = np.linspace(0.0, 2.0, 5)
 INPUTS = {
     "V_N": np.array([0.1, 0.4, 0.4, -0.3, 0.0]),

@@ -1097,13 +1097,12 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
         assert found.vehicle[f"health_{fault.of}"] < (fault.health + 0.05) * found.vehicle[f"health_{other}"]
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("health", [0.0, 0.94])
+@pytest.mark.parametrize("health", spread([0.0, 0.94], (), [0.0]))
 def test_a_thruster_that_is_dead_or_a_little_weaker_is_told(health: float, tmp_path: Path) -> None:
     check(tmp_path, "videoray", Fault("", "l", health), 1, 1)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_angle_and_the_places_of_thrusters_are_told_and_written(tmp_path: Path) -> None:
     found = identify(load_tests(folder(tmp_path, "bluerov2", Fault("", angle=np.radians(41.0)), 1, 2)))
     assert {axis.verdict.word for axis in found.axes} == {"good"}
@@ -1119,18 +1118,18 @@ def test_the_angle_and_the_places_of_thrusters_are_told_and_written(tmp_path: Pa
         assert now.place[0] - before.place[0] == pytest.approx(0.005, abs=0.0015)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_thruster_with_a_curve_of_its_own_is_named(tmp_path: Path) -> None:
     """Commands astern act at 0.8 of what they are."""
     check(tmp_path, "videoray", faults(["l", "r"])["astern"], 1, 1)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_coupled_vehicle_is_named_and_written(tmp_path: Path) -> None:
     check(tmp_path, "bluerov2", Fault("coupling"), 1, 1)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_rotors_whose_speed_lags_are_told_from_a_lag_of_the_force(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["rotors"], 1, 1)
 
