@@ -263,6 +263,65 @@ def test_the_peak_of_a_snap_load_grows_with_the_step_as_the_page_says() -> None:
     assert excess == pytest.approx([0.09, 0.25], abs=0.005)
 
 
+def catenary(length: float, span: float = 15.0) -> float:
+    """Return the tension at the ends of a catenary of the tether above, N."""
+    a = brentq(lambda a: 2.0 * a * sinh(0.5 * span / a) - length, 1.0, 1000.0)
+    return WEIGHT / 20.0 * hypot(0.5 * length, a)
+
+
+def test_a_tether_is_paid_out_and_hauled_in_as_a_catenary_that_changes_slowly() -> None:
+    pytest.importorskip("moordyn")
+    made: Any = slave_of("tether")(instance_name="tether")
+    vars(made).update(length=20.0, mass=0.2, y_top=15.0, z_top=5.0, z_bottom=5.0, shortest=18.0, reel_speed=0.05)
+    lengths = []
+    for n in range(2400):
+        made.length = 20.0 if n < 200 else 22.0 if n < 1200 else 5.0
+        assert made.do_step(0.05 * n, 0.05)
+        lengths.append(made.paid)
+        if n in (100, 500, 800, 1150, 1500, 2000, 2300):  # not where the reel begins and ends to turn, which jerks
+            assert made.tension_top == pytest.approx(catenary(made.paid), rel=0.005)
+    made.terminate()
+    assert np.diff(lengths).max() == pytest.approx(0.05 * 0.05)
+    assert np.diff(lengths).min() == pytest.approx(-0.05 * 0.05)
+    assert lengths[1199] == pytest.approx(22.0)
+    assert lengths[-1] > 18.0
+    assert lengths[:200] == [20.0] * 200
+
+
+def test_a_weight_that_is_lowered_sinks_as_fast_as_the_winch_turns_and_pulls_by_its_weight() -> None:
+    """The winch gains speed with its acceleration, and pays out when it renders."""
+    pytest.importorskip("moordyn")
+    line: Any = slave_of("tether")(instance_name="tether")
+    winch: Any = slave_of("winch")(instance_name="winch")
+    vars(line).update(length=10.0, mass=0.0465, seabed=200.0, z_bottom=10.0)
+    vars(winch).update(length_0=10.0, fastest=0.4, acceleration=0.2)
+    winch.exit_initialization_mode()
+    m, weight, z, w, h = 20.0, 100.0, 10.0, 0.0, 0.01
+    speeds, tensions = [], []
+    for n in range(3000):
+        winch.speed = 1.0 if n >= 1000 else 0.0
+        line.z_bottom, line.vg_D_bottom, line.length = z, w, winch.length
+        assert line.do_step(n * h, h)
+        assert winch.do_step(n * h, h)
+        w += h * (weight + line.F_D_bottom - 60.0 * w * abs(w)) / m
+        z += h * w
+        speeds.append(w)
+        tensions.append(line.tension_bottom)
+    line.terminate()
+    assert np.mean(speeds[800:1000]) == pytest.approx(0.0, abs=1e-3)
+    assert np.mean(speeds[2000:]) == pytest.approx(0.4, rel=0.01)
+    assert winch.length == pytest.approx(10.0 + 0.5 * 0.2 * 2.0**2 + 0.4 * 18.0, abs=0.01)
+    assert np.mean(tensions[2000:]) == pytest.approx(weight - 60.0 * 0.4**2, rel=0.02)
+    winch.speed, winch.render, winch.tension = -1.0, 80.0, 90.0
+    for _ in range(400):
+        winch.do_step(0.0, h)
+    assert winch.turning == 0.4
+    winch.tension = 70.0
+    for _ in range(800):
+        winch.do_step(0.0, h)
+    assert winch.turning == -0.4
+
+
 def test_a_step_that_moordyn_cannot_do_is_refused() -> None:
     pytest.importorskip("moordyn")
     made: Any = slave_of("tether")(instance_name="tether")

@@ -42,7 +42,10 @@ AXES = (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down"))
 
 # name: causality, start, unit, description
 VARIABLES: Variables = {
-    "length": ("parameter", 60.0, "m", "Length without tension"),
+    "length": ("input", 60.0, "m", "Length without tension, to which it is paid out or hauled in"),
+    "paid": ("output", 60.0, "m", "Length without tension that hangs out"),
+    "reel_speed": ("parameter", 1.0, "m/s", "Largest speed of paying out and hauling in"),
+    "shortest": ("parameter", 0.0, "m", "Length to which it can be hauled in; 0: the length at the start"),
     "diameter": ("parameter", 0.0076, "m", "Diameter"),
     "mass": ("parameter", 0.0465, "kg/m", "Mass over length; 0.0465 floats with the default diameter"),
     "EA": ("parameter", 2e4, "N", "Stiffness: tension over strain"),
@@ -130,8 +133,12 @@ class Tether(Companion):
     needs = "moordyn"
     points = tuple(ENDS)
     nodes = NODES
+    length: float
+    reel_speed: float
     limits: ClassVar = {
         "length": (0.01, 1e6),
+        "reel_speed": (0.0, 100.0),
+        "shortest": (0.0, 1e6),
         "diameter": (1e-4, 10.0),
         "mass": (1e-4, 1e4),
         "EA": (1.0, 1e12),
@@ -145,6 +152,7 @@ class Tether(Companion):
         super().__init__(**arguments)
         self.system: object = None
         self.history: list[list[float]] = []
+        self.reeling = False
         self.levels = profile(self.shape.get("levels", 0), "input")
         self.terminals = [("profile", [*self.levels], ())]
         variables = VARIABLES | self.levels
@@ -153,6 +161,10 @@ class Tether(Companion):
             variables |= PLACES | WAVES
         self.told = range(NODES if self.shape.get("waves") else 0)
         self.register(variables, "fixed")
+
+    def exit_initialization_mode(self) -> None:
+        """Tell the length at the start, before the tether is made."""
+        self.paid = self.length
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
@@ -164,6 +176,8 @@ class Tether(Companion):
             if self.system is None:
                 self._begin(places, levels, h)
             own, moordyn = self.__dict__, self.moordyn
+            line = moordyn.GetLine(self.system, 1)
+            self._reel(line, h)
             nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)  # those of the line, then of the ends
             water, acceleration = [turned(at(levels, -z)) for _, _, z in nodes], [[0.0, 0.0, 0.0] for _ in nodes]
             for n in self.told:
@@ -178,7 +192,6 @@ class Tether(Companion):
         for n, end in enumerate(ENDS):
             F = turned(forces[3 * n : 3 * n + 3])
             own |= {f"F_{d}_{end}": x for (d, _, _), x in zip(AXES, F, strict=True)} | {f"tension_{end}": hypot(*F)}
-        line = moordyn.GetLine(self.system, 1)
         for numbers, apart, mark in ((range(SHOWN), SEGMENTS // (SHOWN - 1), ""), (self.told, 1, "p")):
             for n in numbers:
                 at_node = turned(moordyn.GetLineNodePos(line, n * apart))
@@ -204,7 +217,9 @@ class Tether(Companion):
                 self.log(words, Fmi2Status.warning)
         moved = own["mass"] + own["rho"] * pi / 4.0 * own["diameter"] ** 2  # with the water that moves across, kg/m
         stiffness = GROUND * own["diameter"]
-        times = own["length"] / SEGMENTS * sqrt(own["mass"] / own["EA"]), sqrt(moved / stiffness)
+        self.paid = own["length"]
+        self.least = min(own["shortest"] or self.paid, self.paid)
+        times = self.least / SEGMENTS * sqrt(own["mass"] / own["EA"]), sqrt(moved / stiffness)
         file_of = {
             "ends": ends,
             "segments": SEGMENTS,
@@ -221,6 +236,15 @@ class Tether(Companion):
                 moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
                 moordyn.Init(self.system, ends, [0.0] * 6)
         moordyn.ExternalWaveKinInit(self.system)
+
+    def _reel(self, line: object, h: float) -> None:
+        """Pay out or haul in for a step, at most as fast as the reel turns. The whole line grows or shrinks."""
+        change = max(self.length, self.least) - self.paid
+        change = min(max(change, -self.reel_speed * h), self.reel_speed * h)
+        if change or self.reeling:
+            self.moordyn.SetLineUnstretchedLength(line, self.paid)
+            self.moordyn.SetLineUnstretchedLengthVel(line, change / h)
+        self.paid, self.reeling = self.paid + change, bool(change)
 
     def _levels(self) -> list[list[float]]:
         """Return depth and velocity of each level that is deeper than the one above it."""
