@@ -22,6 +22,7 @@ from rov_fmu.tank.log import Log
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
+from tests.often import spread
 from tests.report.conftest import Visit, chart, flown_vehicle, get, until
 from verification.references.fmpy_slave import Slave
 
@@ -89,7 +90,15 @@ def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path, longest: float = 
 
 
 @pytest.mark.parametrize(
-    ("kind", "longest"), [("videoray", 5.0), ("heavy", 5.0), ("everything", 5.0), ("six", 0.05), ("rotors", 0.05)]
+    ("kind", "longest"),
+    [
+        ("everything", 5.0),
+        ("six", 0.05),
+        *(
+            pytest.param(*one, marks=pytest.mark.weekly)
+            for one in (("videoray", 5.0), ("heavy", 5.0), ("rotors", 0.05))
+        ),
+    ],
 )
 def test_a_manoeuvre_is_that_of_the_native_fmu(
     kind: str, longest: float, fly: Fly, request: pytest.FixtureRequest
@@ -422,7 +431,7 @@ def test_a_log_is_read_as_identify_reads_it(name: str, page: Any, vehicle: Vehic
     assert ("The pressure is not used" in said(page)) is (name in ("a barometer in the hull", "a wrong unit"))
 
 
-@pytest.mark.parametrize("kind", ["videoray", "everything"])
+@pytest.mark.parametrize("kind", spread(["videoray", "everything"], ["everything"]))
 @pytest.mark.parametrize("axis", [None, HEAVE], ids=["dive", "log of heave"])
 def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, fly: Fly, tmp_path: Path) -> None:
     """Each name of each column of the catalogue, in each of its units, beside a column of another kind."""

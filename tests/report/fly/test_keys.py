@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE
+from tests.often import spread
 from tests.report.conftest import flown_vehicle, get, until
 from tests.report.test_live import BOX
 
@@ -43,7 +44,9 @@ def test_a_turn_leaves_force_and_speed_and_stays_in_the_tested_range(page: Any) 
     assert hardest["u_r"] < 0.4, "it can still turn"
 
 
-@pytest.mark.parametrize("kind", ["bluerov2", "heavy", "everything", "six", "thrust effects"])
+@pytest.mark.parametrize(
+    "kind", spread(["bluerov2", "heavy", "everything", "six", "thrust effects"], ["everything", "six"])
+)
 def test_no_demand_of_any_vehicle_exceeds_the_largest_command(kind: str, fly: Callable[..., Any]) -> None:
     page = fly(kind)
     axes = page.evaluate("live.vehicle.axes.map(({ name }) => name)")

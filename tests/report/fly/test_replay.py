@@ -15,6 +15,7 @@ from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.report.page.recording import recording_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.often import spread
 from tests.report.conftest import Visit, chart, flown_vehicle, until
 from tests.report.test_live import a_recording
 from tests.tank.readers.motion import DIVE
@@ -151,7 +152,7 @@ def test_a_recording_waits_where_motion_is_to_be_reduced(
 
 @pytest.mark.interop
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("suffix", [".tlog", ".ulg", ".mcap"])
+@pytest.mark.parametrize("suffix", spread([".tlog", ".ulg", ".mcap"], [".tlog"]))
 def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, replay: Callable[..., Any]) -> None:
     log = LOGS[suffix](tmp_path, DIVE)
     page = replay(log, vehicle="bluerov2")
