@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.autopilot.law import SENSORS as LAW_SENSORS
+from rov_fmu.autopilot.pilot import Pilot
 from rov_fmu.bridges.autopilot.fmu import VALID, autopilot_fmu
 from rov_fmu.c.stepper import Stepper
+from rov_fmu.fmu.variables import units_of
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -99,3 +102,42 @@ def test_valid_measurements_change_nothing(fmu: Path) -> None:
     one, other = flown(fmu, None), flown(fmu, "valid_position")
     assert (one[1][:LOST] == other[1][:LOST]).all()
     assert [*VALID] == ["valid_position", "valid_depth", "valid_velocity", "valid_attitude"]
+
+
+def by_late_sensors(name: str, delay: int, noise: float = 0.0) -> tuple[Array, Array]:
+    """Return depth and heading, and the commands, of a vehicle in Python; the sensors are late by some steps.
+
+    It goes 1 m down and 90 degrees to starboard; with noise, it stays where it is.
+    """
+    rov, random = load_vehicle(SHIPPED[name]), np.random.default_rng(1)
+    pilot = Pilot(autopilot_of(rov)).hold(depth=10.0 if noise else 11.0, heading=0.0 if noise else 0.5 * np.pi)
+    names = [one for one in LAW_SENSORS if one in rov.layout.places]
+    stepper = Stepper(rov, {"z": 10.0}, names)
+    size = {"m/s": noise, "rad/s": 0.1 * noise}
+    units = units_of(rov.layout)
+    now, past, rows, commands = stepper.recorded(), list[dict[str, float]](), [], []
+    for _ in range(round(25.0 / H)):
+        noisy = [x + size.get(units[one], 0.0) * random.standard_normal() for one, x in zip(names, now, strict=True)]
+        past.append(dict(zip(names, noisy, strict=True)))
+        made = pilot.step(past[max(0, len(past) - 1 - delay)], H)
+        now = stepper.step([*(rov.layout.usual_inputs | made).values()], H)
+        rows.append([now[names.index(one)] for one in ("z", "psi")])
+        commands.append([*made.values()])
+    return np.array(rows), np.array(commands)
+
+
+@pytest.mark.parametrize("name", [*SHIPPED])
+def test_vehicles_hold_with_late_and_noisy_measurements_as_the_page_says(name: str) -> None:
+    """0.1 s late they hold; 0.2 s late the depth is held, and the heading swings; noise moves the thrusters more."""
+    seen, _ = by_late_sensors(name, 5)
+    assert seen[:, 0].max() < 11.01
+    assert np.degrees(seen[:, 1].max()) < 91.0
+    assert np.ptp(seen[-300:], axis=0).max() < 1e-3
+    late, _ = by_late_sensors(name, 10)
+    assert late[:, 0].max() < 11.02
+    swings = np.degrees(np.ptp(late[-300:, 1]))
+    assert 4.5 < swings < 37.5
+    seen, commands = by_late_sensors(name, 0, 0.03)
+    assert 100.0 * seen[100:, 0].std() < 0.35
+    assert np.degrees(seen[100:, 1].std()) < 0.025
+    assert 0.085 < np.diff(commands[100:], axis=0).std() / np.sqrt(2.0) < 0.215

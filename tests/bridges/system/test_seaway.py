@@ -79,6 +79,36 @@ def test_waves_of_any_depth_obey_airys_equations(depth: float) -> None:
     assert -water(made, t, *place[:2], 0.0)[2] == pytest.approx(surface[6], abs=1e-7)
 
 
+@pytest.mark.parametrize(("north", "east", "depth"), [(0.5, 0.0, 1e4), (-0.4, 0.2, 20.0), (2.0, -1.0, 3.0)])
+def test_waves_on_a_current_obey_its_dispersion_and_are_those_without_it_in_moving_water(
+    north: float, east: float, depth: float
+) -> None:
+    """(omega - k U)^2 = g k tanh(k d), and A = dV/dt + (U grad) V, of velocities that obey Airy's equations."""
+    made, h = sea(components=30, spreading=2.0, seabed=depth, T_p=6.0, current_N=north, current_E=east), 1e-4
+    t, place, U = 3.0, np.array([2.0, -1.0, 1.5]), np.array([north, east, 0.0])
+    assert len(made.waves) == 30
+    for _, omega, k, direction, _ in made.waves:
+        sigma = omega - k * (north * np.cos(direction) + east * np.sin(direction))
+        assert sigma**2 == pytest.approx(G * k * tanh(k * depth), rel=1e-9)
+        assert sigma > 0.0
+    carried = (water(made, t + h, *(place + h * U)) - water(made, t - h, *(place - h * U))) / (2.0 * h)
+    assert carried[:3] == pytest.approx(water(made, t, *place)[3:6], abs=1e-7)
+    surface = [water(made, t + sign * h, *(place[:2] + sign * h * U[:2]), 0.0)[6] for sign in (1.0, -1.0)]
+    assert -water(made, t, *place[:2], 0.0)[2] == pytest.approx((surface[0] - surface[1]) / (2.0 * h), abs=1e-7)
+
+
+def test_a_wave_that_a_current_stops_is_left_out() -> None:
+    """In deep water, none runs against U > g / (4 omega)."""
+    most = G / (4.0 * 2.0 * pi / 3.0)
+    for share, count in ((0.99, 1), (1.01, 0)):
+        made = sea(components=1, T_p=3.0, seabed=1e4, current_N=-share * most)
+        assert len(made.waves) == count
+        assert sea(components=1, T_p=3.0, current_N=share * most).waves[0][2] > 0.0
+    some = sea(components=100, T_p=3.0, seabed=1e4, current_N=-0.5 * most).waves
+    assert 30 < len(some) < 100
+    assert max(omega for _, omega, *_ in some) < G / (4.0 * 0.5 * most)
+
+
 def test_a_sea_that_rises_is_calm_at_first_and_then_the_sea_without_a_rise() -> None:
     rising, full, h, place = sea(rise=4.0, spreading=2.0), sea(spreading=2.0), 1e-4, (2.0, -1.0, 1.5)
     assert water(rising, 0.0, *place)[[0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-15)

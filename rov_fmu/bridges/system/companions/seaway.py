@@ -5,13 +5,16 @@ the surface. It holds them over the next step, so they are those of the middle o
 if it moves on as in the last step. The waves add to the current that is connected. A tether gets velocity and
 acceleration at each of its points, of the waves alone, for it has a current by its profile.
 
+In a current U that is the same everywhere, omega - k U takes the place of omega in the water, and the acceleration is
+that of the water which the current carries. U is a parameter; the velocity of the current comes as it always does.
+
 A wave a cos(phase) of the surface has the phase omega t - k (x cos theta + y sin theta) + epsilon, and omega^2 =
 g k tanh(k d) in water of the depth d (Airy's theory; DNV-RP-C205, 3.2.2). The frequencies are drawn within equal parts
 of the range that has the energy of the spectrum, so that the sea does not repeat, and 4 sqrt(m_0) is H_s. Above the
 mean level, the water moves as there.
 """
 
-from math import cos, exp, pi, sin, sqrt, tanh
+from math import cos, exp, inf, pi, sin, sqrt, tanh
 from random import Random
 from typing import ClassVar
 
@@ -39,6 +42,8 @@ VARIABLES: Variables = {
     "seed": ("parameter", 1.0, "1", "Which sea of this spectrum: a whole number"),
     "seabed": ("parameter", 1000.0, "m", "Depth of the water"),
     "rise": ("parameter", 0.0, "s", "Time in which the waves grow from a calm sea"),
+    "current_N": ("parameter", 0.0, "m/s", "Current northward in which the waves run, which changes their lengths"),
+    "current_E": ("parameter", 0.0, "m/s", "Current eastward in which the waves run"),
     "step": ("parameter", 0.02, "s", "Step at the start, of whose middle the first values are"),
 }
 
@@ -78,6 +83,8 @@ class Seaway(Companion):
         "components": (1.0, MOST),
         "seabed": (0.01, 1e6),
         "rise": (0.0, 1e6),
+        "current_N": (-100.0, 100.0),
+        "current_E": (-100.0, 100.0),
         "step": (0.0, 1e3),
     }
 
@@ -90,6 +97,8 @@ class Seaway(Companion):
     seed: float
     seabed: float
     rise: float
+    current_N: float
+    current_E: float
     step: float
 
     def __init__(self, **arguments: object) -> None:
@@ -136,20 +145,25 @@ class Seaway(Companion):
         return [getattr(self, f"{x}{suffix}") for x in PLACE]
 
     def _drawn(self) -> list[tuple[float, ...]]:
-        """Return amplitude, angular frequency, wave number, direction and phase of each component."""
+        """Return amplitude, angular frequency, wave number, direction and phase of each component.
+
+        One that cannot run against the current is left out.
+        """
         count, peak = min(MOST, round(self.components)), 2.0 * pi / self.T_p
         if count == 1:
-            return [(0.5 * self.H_s, peak, self._wave_number(peak), self.direction, 0.0)]
+            found = [(0.5 * self.H_s, peak, self._wave_number(peak, self.direction), self.direction, 0.0)]
+            return [wave for wave in found if wave[2] < inf]
         random, (low, high) = Random(round(self.seed)), RANGE
         width = (high - low) * peak / count
-        found = []
+        drawn = []
         for n in range(count):
             omega = low * peak + (n + random.random()) * width
-            found.append((self._density(omega / peak), omega, self._direction(random), 2.0 * pi * random.random()))
-        energy = sum(density for density, *_ in found)
+            drawn.append((self._density(omega / peak), omega, self._direction(random), 2.0 * pi * random.random()))
+        energy = sum(density for density, *_ in drawn)
         return [
-            (self.H_s * sqrt(density / (8.0 * energy)), omega, self._wave_number(omega), direction, phase)
-            for density, omega, direction, phase in found
+            (self.H_s * sqrt(density / (8.0 * energy)), omega, k, direction, phase)
+            for density, omega, direction, phase in drawn
+            if (k := self._wave_number(omega, direction)) < inf
         ]
 
     def _density(self, ratio: float) -> float:
@@ -166,13 +180,27 @@ class Seaway(Companion):
                 return self.direction + off
         return self.direction
 
-    def _wave_number(self, omega: float) -> float:
-        """Return k with omega^2 = g k tanh(k d), by Newton's method from above."""
+    def _wave_number(self, omega: float, direction: float) -> float:
+        """Return k with (omega - k U)^2 = g k tanh(k d), the longest wave; infinity if none runs against the current U.
+
+        By Newton's method: without a current from above, and then from the wave that would keep its speed in the water.
+        """
         deep = omega**2 / G
         k = deep / sqrt(tanh(deep * self.seabed))
         for _ in range(20):
             t = tanh(k * self.seabed)
             k -= (k * t - deep) / (t + k * self.seabed * (1.0 - t * t))
+        U = self.current_N * cos(direction) + self.current_E * sin(direction)
+        if U == 0.0 or omega / k + U <= 0.0:
+            return inf if U else k
+        k = omega / (omega / k + U)
+        for _ in range(50):
+            t = tanh(k * self.seabed)
+            sigma = sqrt(G * k * t)
+            group = 0.5 * sigma / k * (1.0 + k * self.seabed * (1.0 - t * t) / t) + U
+            if group <= 0.0:
+                return inf
+            k -= (sigma + k * U - omega) / group
         return k
 
     def _put(self, suffix: str, t: float, at: list[float]) -> None:
@@ -182,13 +210,14 @@ class Seaway(Companion):
         depth = min(max(z, 0.0), self.seabed)
         for a, omega, k, direction, phase in self.waves:
             north, east = cos(direction), sin(direction)
+            sigma = omega - k * (self.current_N * north + self.current_E * east)  # as water sees it that is carried
             down, up = exp(-k * depth), exp(-k * (2.0 * self.seabed - depth))
             along, across = ((down + s * up) / (1.0 - exp(-2.0 * k * self.seabed)) for s in (1.0, -1.0))
             p = omega * t - k * (x * north + y * east) + phase
             c, s = a * cos(p), a * sin(p)
             for n, (share, value, rate) in enumerate(((north * along, c, -s), (east * along, c, -s), (across, s, c))):
-                V[n] += omega * share * value
-                A[n] += omega**2 * share * rate
+                V[n] += sigma * share * value
+                A[n] += sigma**2 * share * rate
             elevation += c
         share, growth = (t / self.rise, 1.0 / self.rise) if t < self.rise else (1.0, 0.0)
         for n, (velocity, acceleration, steady) in enumerate(zip(VELOCITY, ACCELERATION, STEADY, strict=True)):
