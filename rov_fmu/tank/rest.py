@@ -3,8 +3,9 @@
 Its motion there does not follow from thrust, drag and weight, so these times are left out before a fit. A contradiction
 tells them: the push would move the vehicle, and it does not move so. What a push does is learnt from the log itself,
 along heave from the depth, and along surge and sway from a measured velocity, whose integral is the way. The
-acceleration is a c|c| - b w|w| - d w + e, with the command c and the rate w. In heave, e is the load. In surge and sway
-it is what a current does by the heading, and the coupling with the turn.
+acceleration is a c|c| - b w|w| - d w + e, with the command c and the rate w, and another a astern, which would be taken
+for a load. In heave, e is the load. In surge and sway it is what a current does by the heading, and the coupling with
+the turn.
 
 Horizontally, a vehicle must stand still. Something that slides along an oblique wall is not told, and no wall is where
 nothing measures a velocity.
@@ -128,10 +129,12 @@ def _course(log: Log, commands: Commands, channel: Channel, axis: Axis, layout: 
             others.append(np.gradient(heading, _STEP) * across)
     in_rows = commands.in_rows
     forces = {name: c if layout.has_wrench else c * np.abs(c) for name, c in in_rows.items()}
-    thrust = push_along(layout, axis, forces)
+    thrusts = [
+        push_along(layout, axis, {n: bound(f, 0.0) for n, f in forces.items()}) for bound in (np.maximum, np.minimum)
+    ]
     place = np.interp(time, times, values)
     push = held(commands.rows, push_along(layout, axis, in_rows), time)
-    return _Course(time, place, push, *_shares(time, place, commands.rows, thrust, times, others))
+    return _Course(time, place, push, *_shares(time, place, commands.rows, thrusts, times, others))
 
 
 def _rests(course: _Course, axis: Axis, height: float) -> Iterator[tuple[float, float, str]]:
@@ -201,7 +204,7 @@ def _stays(place: Array, slow: Flags, near: float, still: float) -> Flags:
 
 
 def _shares(
-    time: Array, place: Array, rows: Array, thrust: Array, times: Array, others: Sequence[Array]
+    time: Array, place: Array, rows: Array, thrusts: Sequence[Array], times: Array, others: Sequence[Array]
 ) -> tuple[Array, Array, Array, tuple[float, float, float]]:
     """Return the acceleration that the push and others give a vehicle at rest, m/s^2, how much of it the motion shows,
     and the share that overcomes drag, at equal steps of time; then the law without a push, as `_Course` has it.
@@ -217,9 +220,12 @@ def _shares(
     windows = sliding_window_view(place, size)
     rate, acceleration = windows @ steps / (steps @ steps), 2.0 * windows @ curve / (curve @ curve)
     inside = np.append(rows, rows[-1] + 1.0)
-    impulse = np.append(0.0, np.cumsum(thrust * np.diff(inside)))  # its integral is exact between rows
-    ends = np.interp(np.append(time - 0.5 * _STEP, time[-1] + 0.5 * _STEP), inside, impulse)
-    acting = [sliding_window_view(one, size) @ (weights / weights.sum()) for one in (np.diff(ends) / _STEP, *others)]
+    acting = []
+    for thrust in thrusts:
+        impulse = np.append(0.0, np.cumsum(thrust * np.diff(inside)))  # its integral is exact between rows
+        ends = np.interp(np.append(time - 0.5 * _STEP, time[-1] + 0.5 * _STEP), inside, impulse)
+        acting.append(np.diff(ends) / _STEP)
+    acting = [sliding_window_view(one, size) @ (weights / weights.sum()) for one in (*acting, *others)]
     gap = np.diff(times, prepend=times[0])[np.minimum(np.searchsorted(times, time), len(times) - 1)]
     known = (gap < _HALF * _STEP)[_HALF:-_HALF]
     causes = np.column_stack([*acting, -rate * np.abs(rate), -rate])
@@ -240,8 +246,8 @@ def _shares(
     is_told = known & (np.abs(push) > _SIGNIFICANT * error)
     share[_HALF:-_HALF][is_told] = ((acceleration - slowed) / push)[is_told]
     drag[_HALF:-_HALF][is_told] = (slowed / push)[is_told]
-    is_loaded = abs(found[1]) > _SIGNIFICANT * noise * np.sqrt(spread[1, 1])
-    load, square, linear = (float(one) for one in found[[1, -2, -1]])
+    is_loaded = abs(found[2]) > _SIGNIFICANT * noise * np.sqrt(spread[2, 2])
+    load, square, linear = (float(one) for one in found[[2, -2, -1]])
     return given, share, drag, (load * is_loaded, max(square, 0.0), max(linear, 0.0))
 
 

@@ -51,9 +51,11 @@ def drawn(
     start: float = 3.0,
     load: float = -2.0,
     zeroed: float | None = None,
+    astern: float = 1.0,
 ) -> Log:
     """Return a log of 110 s at 10 Hz; `command` may replace what is commanded and `limit` the motion.
 
+    `astern` is how much of the thrust down a push up has.
     `zeroed` is the depth at which a sensor was switched on that takes all above for the surface.
     """
     random = np.random.default_rng(seed)
@@ -70,7 +72,8 @@ def drawn(
             zero = zero if zeroed is None else min(zero, depth)
             rows.append((t, s.down, s.ahead, depth - zero, s.u + random.normal(0.0, 0.01)))
         share = float(np.clip(1.0 + s.z / 0.25, 0.0, 1.0))  # of the vehicle in the water
-        force = 110.0 * s.down * abs(s.down) + load - 40.0 * s.w * abs(s.w) - 6.0 * s.w
+        push = 110.0 * (astern if s.down < 0.0 else 1.0) * s.down * abs(s.down)
+        force = push + load - 40.0 * s.w * abs(s.w) - 6.0 * s.w
         s.w += STEP * (share * force + (1.0 - share) * 100.0) / 20.0
         s.u += STEP * (90.0 * s.ahead * abs(s.ahead) - 30.0 * s.u * abs(s.u) - 5.0 * s.u) / 18.0
         s.w *= 1.0 - 2.0 * STEP * (s.z < 0.1)
@@ -192,9 +195,10 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
         (drawn(9, drives_on, wall), [(42.0, 56.0)], [(45.0, 51.0)]),
-        (drawn(12, drifts_above, start=0.05, load=-0.5), [(0.0, 22.0)], [(1.0, 19.5)]),
+        (drawn(12, drifts_above, start=0.05, load=-0.7), [(0.0, 22.0)], [(1.0, 19.5)]),
         (drawn(11, stuck_below, dives_to(7.0), load=-0.5), [(0.0, 110.0)], [(63.0, 79.0)]),
-        (drawn(16, brought_below, dives_to(9.0)), [(59.0, 84.0)], [(60.0, 79.0)]),
+        (drawn(12, drifts_above, start=0.05, load=-1.0, astern=0.75), [(0.0, 22.0)], [(1.0, 19.5)]),
+        (drawn(14, brought_below, dives_to(9.0)), [(59.0, 84.0)], [(60.0, 79.0)]),
         (drawn(10, rises_beyond, start=4.0, zeroed=4.0), [(0.0, 110.0)], [(14.0, 17.5)]),
     ],
     ids=[
@@ -209,6 +213,7 @@ def pushes_on(t: float, s: State) -> None:
         "wall",
         "thrusters off at the surface",
         "thrusters off on the bottom",
+        "weaker thrust up",
         "brought to the bottom",
         "depth set to zero again",
     ],
