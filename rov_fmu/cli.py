@@ -161,15 +161,21 @@ _GONE = {
     ("identify", "--draft"): "rov-fmu inspect --draft",
 }
 """The words of commands of earlier versions, and what does the same now."""
-_SECTIONS = ("Your vehicle", "At work", "For others")
+_SECTIONS = {
+    "What most people do": ("identify", "fly", "build"),
+    "Your vehicle": ("inspect", "tune", "simulate", "list"),
+    "At work": ("sitl", "system", "study"),
+    "For others": ("export", "prove", "schema"),
+}
+"""The commands in the order of the help: what most people do comes first."""
 
 
 class _Command(click.Command):
-    """A command of one of the sections, with an example, which is the end of its help."""
+    """A command with an example, which is the end of its help."""
 
-    def __init__(self, *, section: str, example: str, **options: Any) -> None:
+    def __init__(self, *, example: str, **options: Any) -> None:
         super().__init__(epilog=f"Example: {example}", **options)
-        self.section, self.example = _SECTIONS.index(section), example
+        self.example = example
 
 
 class _Commands(click.Group):
@@ -180,16 +186,15 @@ class _Commands(click.Group):
 
     command_class = _Command
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write each section. Click would cut the summaries to a line."""
-        rows: list[list[tuple[str, str]]] = [[] for _ in _SECTIONS]
-        for name in self.list_commands(ctx):
-            if isinstance(command := self.commands[name], _Command):
-                summary = command.get_short_help_str(limit=1000)
-                rows[command.section] += [(name, summary), ("", command.example)]
-        for title, own in zip(_SECTIONS, rows, strict=True):
+        for title, names in _SECTIONS.items():
+            rows: list[tuple[str, str]] = []
+            for command in (self.commands[name] for name in names):
+                assert isinstance(command, _Command)
+                rows += [(command.name or "", command.get_short_help_str(limit=1000)), ("", command.example)]
             with formatter.section(title):
-                formatter.write_dl(own)
+                formatter.write_dl(rows)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """Return the command that the arguments name. Raises UsageError with what a command that is gone is now."""
@@ -200,7 +205,7 @@ class _Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Return the names of the commands in the order of the sections."""
-        return sorted(self.commands, key=lambda name: getattr(self.commands[name], "section", 0))
+        return [name for names in _SECTIONS.values() for name in names]
 
 
 def _tell_version(context: click.Context, _: click.Parameter, is_asked: bool) -> None:
@@ -245,7 +250,7 @@ def _done(context: click.Context, _: object) -> None:
 # ---- build -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("build", section="For others", example="rov-fmu build bluerov2 -o bluerov2.fmu")
+@_commands.command("build", example="rov-fmu build bluerov2 -o bluerov2.fmu")
 @_vehicle_or_videoray()
 @_output_option(
     metavar="FILE.fmu",
@@ -316,7 +321,7 @@ def _print_built(built: "Built", seconds: float) -> None:
 # ---- list ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("list", section="Your vehicle", example="rov-fmu list")
+@_commands.command("list", example="rov-fmu list")
 @click.argument("folder", type=_FILE, default=".")
 def _list(folder: Path) -> None:
     """List the vehicles and companions that ship, and a folder's files.
@@ -356,7 +361,7 @@ def _list(folder: Path) -> None:
 # ---- simulate --------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("simulate", section="At work", example="rov-fmu simulate bluerov2 --set surge=0.3 --plot")
+@_commands.command("simulate", example="rov-fmu simulate bluerov2 --set surge=0.3 --plot")
 @_vehicle_or_videoray()
 @_set_option(
     help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
@@ -439,7 +444,7 @@ def _warn(message: str) -> None:
 # ---- fly -------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("fly", section="At work", example="rov-fmu fly bluerov2")
+@_commands.command("fly", example="rov-fmu fly bluerov2")
 @_vehicle_or_videoray()
 @click.option(
     "--against",
@@ -478,7 +483,7 @@ def _fly(
 # ---- sitl ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("sitl", section="At work", example="rov-fmu sitl bluerov2 --log dive.csv")
+@_commands.command("sitl", example="rov-fmu sitl bluerov2 --log dive.csv")
 @_vehicle()
 @click.option(
     "--frame",
@@ -563,7 +568,7 @@ class _OptionOf(click.Option):
 _option_of = partial(click.option, cls=_OptionOf)
 
 
-@_commands.command("export", section="For others", example="rov-fmu export bluerov2 --to mujoco")
+@_commands.command("export", example="rov-fmu export bluerov2 --to mujoco")
 @_vehicle_or_videoray()
 @click.option(
     "--to",
@@ -632,7 +637,7 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
 # ---- prove -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("prove", section="For others", example="rov-fmu prove bluerov2.fmu")
+@_commands.command("prove", example="rov-fmu prove bluerov2.fmu")
 @click.argument("fmu", type=_FILE)
 @click.option(
     "--interface",
@@ -663,7 +668,7 @@ def _prove(fmu: Path, **options: Any) -> None:
 # ---- system ----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("system", section="At work", example="rov-fmu system plan.toml -o dive.ssp --run")
+@_commands.command("system", example="rov-fmu system plan.toml -o dive.ssp --run")
 @click.argument("plan", type=_FILE, required=False)
 @_output_option(metavar="FILE.ssp", help="System to write.")
 @click.option("--run", "runs", is_flag=True, help="Run it, also with half the step, and write FILE.csv and FILE.svg.")
@@ -688,7 +693,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 # ---- study -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("study", section="At work", example="rov-fmu study plan.toml -o results")
+@_commands.command("study", example="rov-fmu study plan.toml -o results")
 @click.argument("plan", type=_FILE)
 @_output_option(required=True, metavar="RESULTS", help="Folder of the results.")
 @click.option(
@@ -723,9 +728,7 @@ def _study(plan: Path, output: Path, **options: Any) -> None:
 _tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type=_FILE)
 
 
-@_commands.command(
-    "identify", section="Your vehicle", example="rov-fmu identify tests -o my_rov.toml --report my_rov.html"
-)
+@_commands.command("identify", example="rov-fmu identify tests -o my_rov.toml --report my_rov.html")
 @_tests_argument(metavar="TESTS...")
 @_output_option(metavar="VEHICLE.toml", help="Vehicle file to write.")
 @_file_option(
@@ -775,7 +778,7 @@ def _identify(
 # ---- inspect ---------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("inspect", section="Your vehicle", example="rov-fmu inspect dive.csv --draft")
+@_commands.command("inspect", example="rov-fmu inspect dive.csv --draft")
 @_tests_argument(metavar="LOG...")
 @_file_option("--report", metavar="PAGE.html", help="Page to write, with pictures of the logs.")
 @click.option(
@@ -801,9 +804,7 @@ def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, forc
 # ---- tune ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command(
-    "tune", section="Your vehicle", example="rov-fmu tune my_rov.toml --axis surge --command 0.5 --v-ss 0.8"
-)
+@_commands.command("tune", example="rov-fmu tune my_rov.toml --axis surge --command 0.5 --v-ss 0.8")
 @_vehicle()
 @click.option(
     "--axis",
@@ -857,7 +858,7 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
 # ---- schema ----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("schema", section="For others", example="rov-fmu schema")
+@_commands.command("schema", example="rov-fmu schema")
 def _schema() -> None:
     """Print the JSON schema of the vehicle file, for editors."""
     from rov_fmu.vehicle.json_schema import json_schema_text

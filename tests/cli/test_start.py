@@ -105,8 +105,12 @@ def test_a_vehicle_is_loaded_without_what_takes_long_to_import() -> None:
 def test_the_help_shows_each_command_in_its_section_with_an_example_that_it_takes(capsys: Capsys) -> None:
     assert main([]) == 0
     printed = capsys.readouterr().out
-    assert re.findall(r"^(\S.*):$", printed, re.MULTILINE) == ["Options", "Your vehicle", "At work", "For others"]
+    sections = ["Options", "What most people do", "Your vehicle", "At work", "For others"]
+    assert re.findall(r"^(\S.*):$", printed, re.MULTILINE) == sections
     context = click.Context(_commands, info_name="rov-fmu")
+    listed = _commands.list_commands(context)
+    assert listed[:3] == ["identify", "fly", "build"]
+    assert sorted(listed) == sorted(_commands.commands)
     for name, command in _commands.commands.items():
         assert isinstance(command, _Command), name
         program, own, *arguments = shlex.split(command.example)
