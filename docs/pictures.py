@@ -262,7 +262,6 @@ PICTURES = {
 """The pictures of pages and plots by their names."""
 ELSEWHERE = {
     "cost_error.svg": "python -m verification.benchmarks",
-    "identification_scores.svg": "python -m verification.identification",
 }
 """Pictures that other commands draw."""
 
