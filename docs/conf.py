@@ -73,15 +73,18 @@ SHOWN_HERE = re.compile(r"^The site shows \[(.+)\]\(\.\./\1\) here\.$", re.MULTI
 
 
 def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
-    """Put in the files that the site shows. Their links are seen from docs/; to what is not on the site there is none.
+    """Put in the files that the site shows. Their links are seen from docs/, and lead to pages of the site.
 
     The first page of the site is the README.
     """
 
     def text(match: re.Match[str]) -> str:
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
-        whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
-        return re.sub(r"\[([^\]]+)\]\((CITATION\.cff|SECURITY\.md|CODE_OF_CONDUCT\.md)\)", r"\1 (`\2`)", whole)
+        return re.sub(
+            r"\]\((CHANGELOG|CODE_OF_CONDUCT|CONTRIBUTING|SECURITY)\.md\)",
+            lambda name: f"]({name[1].lower().replace('_', '-')}.md)",
+            whole,
+        )
 
     source[0] = SHOWN_HERE.sub(text, source[0]).replace("](../README.md", "](index.md")
     source[0] = MOVING_PICTURE.sub(lambda _: COCKPIT, source[0])

@@ -6,8 +6,6 @@ end, in comments. The drawings are files of their own.
 
 import re
 from html import escape
-from importlib import import_module
-from inspect import getdoc, getsource, isfunction, signature
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,6 @@ import click
 from matplotlib.figure import Figure
 
 from docs import compared
-from rov_fmu import HOMES
 from rov_fmu.autopilot.figures import first_holds
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan
@@ -25,7 +22,6 @@ from rov_fmu.equation.catalogue import AXIS, HEAVE, ROLL, SURGE, TUNING, axis_wo
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.kinds import PRIORS
-from rov_fmu.identify.result import CONSTANTS
 from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page.equations import equations_of
@@ -42,7 +38,7 @@ from verification.identification.strangers import gates
 
 Table = list[tuple[str, ...]]
 _NAMES = (
-    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "system.md", "cli.md", "api.md", "vehicles.md"),
+    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "system.md", "cli.md", "vehicles.md"),
     *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md", "autopilot.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
@@ -50,8 +46,6 @@ DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", 
 """The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
 
 _KEYS = ("key", "value", "what")
-_WIDEST = 48
-"""The characters of a name with its arguments in a table; of longer ones the arguments are left out."""
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
 
@@ -69,8 +63,6 @@ def tables() -> dict[str, Table]:
     kept = gates.stages()[-1:]
     by_group = gates.by_kind(kept)[: 1 + len(gates.GROUPS)]
     found |= {"gates": gates.gates(kept), "strangers": [(name, *cells) for name, _, *cells in by_group]}
-    chosen = ((f"{one.value:g}", one.words, one.seen) for one in CONSTANTS.values())
-    found["chosen"] = [("number", "of", "what was seen"), *chosen]
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
@@ -200,8 +192,6 @@ def filled(page: str) -> str:
         kind, name = match[2], match[3]
         if kind == "commands":
             content = _command_reference()
-        elif kind == "api":
-            content = _interface()
         elif kind == "drawings":
             content = _gallery()
         elif kind == "equations":
@@ -211,7 +201,7 @@ def filled(page: str) -> str:
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (api|commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
         text,
         page,
         flags=re.DOTALL,
@@ -260,54 +250,6 @@ def _command_reference() -> str:
             usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
         rows.append((f"`{usage}`", escape(command.get_short_help_str(limit=1000), quote=False)))
     return markdown([("command", "what it does"), *rows])
-
-
-def _interface() -> str:
-    """The public functions with the first sentence of each, by the headings of the site's page.
-
-    Classes without members that the page names are only types of arguments and results, and have no row.
-    """
-    page = Path(__file__).with_name("api-in-full.rst").read_text(encoding="utf-8")
-    found: list[str] = []
-    rows: Table = []
-    for heading, directives in re.findall(r"^([^\n]+)\n-+\n\n(.*?)(?=\n\n|\Z)", page, re.MULTILINE | re.DOTALL):
-        rows, types = [("name", "what it is")], list[str]()
-        for kind, path, members in re.findall(r"auto(\w+):: (\S+)(?:\n +:members: (.*))?", directives):
-            module, _, name = path.rpartition(".")
-            value = getattr(import_module(module), name)
-            if kind == "class" and not members:
-                types.append(f"`{name}`")
-                continue
-            rows.append(_described(path, value) if kind != "data" else (f"`rov_fmu.{name}`", _said_of_data(name)))
-            rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
-        parts = [f"## {heading}", markdown(rows) if rows[1:] else "", f"Types: {', '.join(types)}." if types else ""]
-        found.append("\n\n".join(filter(None, parts)))
-    return "\n\n".join(found)
-
-
-def _described(name: str, value: Any) -> tuple[str, str]:
-    """The row of a function or a class: its name, those of its arguments where they fit, and its first sentence."""
-    arguments = ""
-    if isfunction(value):
-        own = [
-            f"{'*' if p.kind is p.VAR_POSITIONAL else '**' if p.kind is p.VAR_KEYWORD else ''}{p.name}"
-            for p in signature(value).parameters.values()
-            if p.name != "self"
-        ]
-        arguments = f"({', '.join(own)})"
-    if len(name + arguments) > _WIDEST:
-        arguments = "(…)"
-    return f"`{name}{arguments}`", _first_sentence(getdoc(value) or "")
-
-
-def _said_of_data(name: str) -> str:
-    """The first sentence of the text below an assignment of a public name."""
-    (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(HOMES[name])), re.MULTILINE | re.DOTALL)
-    return _first_sentence(words)
-
-
-def _first_sentence(words: str) -> str:
-    return _escaped(words.partition("\n\n")[0]).partition(". ")[0].rstrip(".") + "."
 
 
 def _equations(name: str) -> str:

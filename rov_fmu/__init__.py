@@ -6,8 +6,8 @@
     run = vehicle.simulate([0.0, 5.0, 10.0], {"u_l": 0.3, "u_r": 0.3})
     print(run["u"])
 
-`dir(rov_fmu)` lists what is public, and docs/api.md describes it. Everything else in the modules below is internal, and
-may change with any version.
+`dir(rov_fmu)` lists what is public, and docs/api-in-full.rst has the same by subject. Everything else in the modules
+below is internal, and may change with any version.
 """
 
 from importlib import import_module

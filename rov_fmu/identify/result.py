@@ -27,7 +27,7 @@ Tested = tuple[float, float]
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the method that was chosen after results were seen. The documentation has all of them."""
+    """A number of the method that was chosen after results were seen, which stand beside it."""
 
     value: float
     words: str

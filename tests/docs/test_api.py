@@ -1,4 +1,4 @@
-"""The public functions of docs/api.md: each argument is described, and each has an example that runs."""
+"""The public functions of docs/api-in-full.rst: each argument is described, and each has an example that runs."""
 
 import re
 import shutil

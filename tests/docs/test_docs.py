@@ -38,6 +38,7 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "models").rglob("README.md")),
     *sorted((ROOT / "examples").rglob("README.md")),
+    *sorted((ROOT / "verification").glob("*/README.md")),
 ]
 PROGRAMS = ("rov-fmu ", "python build_fmu.py", "python -m ")
 HOLDS_COMMANDS = re.compile(r"(?:rov-fmu|fmpy|cat|mkdir|python -m examples\.(?:tank_tests|dive_log)) ")
@@ -113,7 +114,7 @@ def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
 
 def test_every_page_is_in_one_part() -> None:
     parts = re.findall(r":caption: (.*?)\n\n(.*?)```", (ROOT / "docs" / "index.md").read_text("utf-8"), re.DOTALL)
-    assert [part for part, _ in parts] == ["Use", "Reference", "Evidence and development"]
+    assert [part for part, _ in parts] == ["Install", "Tutorials", "How-to", "Reference", "Explanation", "Project"]
     named = [page for _, pages in parts for page in pages.split()]
     pages = [page.stem for page in (ROOT / "docs").iterdir() if page.suffix in (".md", ".rst")]
     assert sorted([*named, "index"]) == sorted(pages)

@@ -114,7 +114,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, schedul
     It is 7 % after two logs: when the logger's rows take effect is known to some 0.03 s, and with it the inertia. It is
     34 % after six steady speeds with errors of 3 %, which hardly tell the power of drag.
 
-    docs/studies.md gives the shares for more vehicles, which would take too long here.
+    docs/many-runs.md gives the shares for more vehicles, which would take too long here.
     """
     widths = list[float]()
     inside = {(level, of): list[float]() for level in LEVELS for of in ("u", "x", "stopping_distance")}
