@@ -247,7 +247,7 @@ static bool sense(double at[], const model_numbers *n, delay_line *line, double 
         const bool in_each_step = n->of[i].rate == 0.0;
         const double period = in_each_step ? h : 1.0 / n->of[i].rate, last = in_each_step ? q->next : floor(t / period + 1e-6);
         if (last >= q->next) {
-            take(at, n, i, last, period, in_each_step ? t : last * period, line);
+            take(at, n, i, last, period, in_each_step || t > (last + 1e-6) * period ? t : last * period, line);
         }
         int k = 0;
         while (k < WAITING - 1 && q->due[k] > t + h + 1e-6 * period) {
