@@ -18,7 +18,8 @@ WAVES = (ROOT / "docs" / "waves.md").read_text(encoding="utf-8")
 
 
 def block(page: str, language: str) -> str:
-    return re.findall(rf"^```{language}\n(.*?)^```", page, re.MULTILINE | re.DOTALL)[0]
+    first, *_ = re.findall(rf"^```{language}\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    return str(first)
 
 
 def test_the_plan_of_the_page_is_a_dive_with_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ The start values are those of instruments that ROVs have. What no data sheet say
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rov_fmu.bridges.autopilot.fmu import VALID
 from rov_fmu.c.source import sampled_sources
@@ -121,7 +121,7 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
     power = Declaration("A", "Electric current of the thrusters")
     inputs = made.add("electric_current", power, "input", "continuous", start=0.0) + 1
     made.add_clock()
-    given = {"initial": "calculated", "dependencies": {}}
+    given: dict[str, Any] = {"initial": "calculated", "dependencies": {}}
     told = {name: made.add(name, declared[name], "output", "continuous", **given) for name in measured}
     times = len(made)
     for name, one in _INSTRUMENTS.items():
@@ -129,8 +129,8 @@ def sensors_model(vehicle: Vehicle, step: float) -> FmuModel:
         made.add(f"time_of_{name}", of_sample, "output", "continuous", **given)
     flags = len(made)
     for flag, one in zip(VALID, _INSTRUMENTS.values(), strict=True):
-        words = Declaration("1", f"1: the {one.words} measures, 0: it tells its last sample")
-        made.add(flag, words, "output", "continuous", display_unit=None, **given)
+        measures = Declaration("1", f"1: the {one.words} measures, 0: it tells its last sample")
+        made.add(flag, measures, "output", "continuous", display_unit=None, **given)
     parameters = len(made)
     for name, unit, start, low, high, words in _parameters():
         bounds = {"start": start, "minimum": low, "maximum": high, "display_unit": None}

@@ -45,6 +45,11 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Fmu]
     return found
 
 
+def times(count: int, h: float = H) -> Array:
+    """Return the times at the start and after each of some steps."""
+    return np.array([n * h for n in range(count + 1)])
+
+
 def moved(t: Array, names: list[str]) -> dict[str, Array]:
     """Return a motion: each input is another sine, and the quaternion is one."""
     made = {name: np.sin((0.3 + 0.1 * n) * t + n) for n, name in enumerate(names)}
@@ -58,7 +63,7 @@ def told(
     fmu: Fmu, seconds: float, start: Mapping[str, float], inputs: Mapping[str, Array] | None = None, h: float = H
 ) -> dict[str, Array]:
     """Return what the sensors tell after each step; `inputs` are what is true at its start."""
-    t = h * np.arange(round(seconds / h) + 1)
+    t = times(round(seconds / h), h)
     names = [name for name in [*CHANNELS, *STATUS] if name in fmu.variables]
     given = {f"true_{name}": values[:-1] for name, values in (inputs or {}).items()}
     result = fmu.run(t, given, names, start)
@@ -67,7 +72,7 @@ def told(
 
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "videoray"])
 def test_without_faults_the_sensors_tell_the_truth_to_the_bit(fmus: dict[tuple[str, int], Fmu], name: str) -> None:
-    fmu, t = fmus[name, 2], H * np.arange(301)
+    fmu, t = fmus[name, 2], times(300)
     motion = moved(t, [one for one in CHANNELS if one in fmu.variables])
     found = told(fmu, 3.0, {"ideal": 1.0}, motion)
     assert len(motion) == {"bluerov2_heavy": 16, "videoray": 10}[name]
@@ -160,7 +165,7 @@ def test_the_wander_has_the_allan_deviation_of_gauss_and_markov(long: dict[str, 
 
 
 def test_a_value_is_held_between_samples_and_comes_late(fmus: dict[tuple[str, int], Fmu]) -> None:
-    t = H * np.arange(1001)
+    t = times(1000)
     start = QUIET | AT_ONCE | {"rate_position": 2.0, "delay_position": 0.7}
     found = told(fmus["videoray", 2], 10.0, start, {"x": t, "psi": 0.0 * t})
     expected = np.maximum(np.floor((t - 0.7) / 0.5 + 1e-6) * 0.5, 0.0)
@@ -171,7 +176,7 @@ def test_a_value_is_held_between_samples_and_comes_late(fmus: dict[tuple[str, in
 def test_a_dvl_has_lock_between_two_altitudes_and_else_tells_its_last_velocity(
     fmus: dict[tuple[str, int], Fmu],
 ) -> None:
-    t = H * np.arange(1001)
+    t = times(1000)
     start = QUIET | AT_ONCE | {"seabed": 60.0, "altitude_least": 2.0, "altitude_most": 50.0, "down_velocity": 1.0}
     found = told(fmus["videoray", 2], 10.0, start, {"z": 6.0 * t, "u": t})
     altitude = 59.0 - 6.0 * t
@@ -184,7 +189,7 @@ def test_a_dvl_has_lock_between_two_altitudes_and_else_tells_its_last_velocity(
 
 
 def test_a_lever_arm_a_lag_a_resolution_and_a_current_act_as_they_should(fmus: dict[tuple[str, int], Fmu]) -> None:
-    fmu, t = fmus["bluerov2_heavy", 2], H * np.arange(301)
+    fmu, t = fmus["bluerov2_heavy", 2], times(300)
     motion = moved(t, [one for one in CHANNELS if one in fmu.variables])
     place = {"forward": 0.3, "starboard": -0.2, "down": 0.5}
     start = (
@@ -293,11 +298,11 @@ def test_a_run_writes_a_log_whose_samples_are_those_of_the_dive(tmp_path: Path) 
     assert (log["time [s]"] == motion["time"]).all()
     for n in range(1, 9):
         assert (log[f"u_{n} [1]"] == motion[f"autopilot.u_{n}"]).all()
-    times = {name: motion["time"][np.isfinite(values)] for name, values in log.items()}
-    np.testing.assert_allclose(np.diff(times["north velocity [m/s]"]), 0.2)
-    assert times["east velocity [m/s]"][-1] == pytest.approx(0.8), "what is not valid is empty"
+    taken = {name: motion["time"][np.isfinite(values)] for name, values in log.items()}
+    np.testing.assert_allclose(np.diff(taken["north velocity [m/s]"]), 0.2)
+    assert taken["east velocity [m/s]"][-1] == pytest.approx(0.8), "what is not valid is empty"
     due = np.arange(0.0, 1.9, 0.05)
-    np.testing.assert_allclose(times["depth [m]"][: len(due)], np.ceil(due / 0.02 - 1e-6) * 0.02, atol=1e-9)
+    np.testing.assert_allclose(taken["depth [m]"][: len(due)], np.ceil(due / 0.02 - 1e-6) * 0.02, atol=1e-9)
     for name, truth, noise in (
         ("depth [m]", "z", 0.05),
         ("north velocity [m/s]", "vg_N", 0.03),
