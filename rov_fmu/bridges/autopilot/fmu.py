@@ -94,8 +94,8 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     held = dict.fromkeys(AXES, -1)
     for axis in autopilot.axes:
         words = f"1: {axis.name} does what its mode asks for; 0: it lacks a valid measurement, and a lower mode acts"
-        told: dict[str, Any] = {"initial": "calculated", "dependencies": {}, "display_unit": None}
-        held[axis] = add(f"is_held_{axis.velocity}", Declaration("1", words), "output", "discrete", **told)
+        rest: dict[str, Any] = {"initial": "calculated", "dependencies": {}, "display_unit": None}
+        held[axis] = add(f"is_held_{axis.velocity}", Declaration("1", words), "output", "discrete", **rest)
     gains = {axis: [-1] * len(GAINS) for axis in AXES}
     for axis in autopilot.axes:
         for n, name in enumerate(OWN_GAINS):

@@ -59,7 +59,8 @@ def flown(fmu: Path, flag: str | None, **start: float) -> tuple[Array, Array, Ar
         now = rov.step([*given.values()], H)
     pilot.terminate()
     pilot.freeInstance()
-    return tuple(np.array(one) for one in zip(*rows, strict=True))
+    measured, given, acts = zip(*rows, strict=True)
+    return np.array(measured), np.array(given), np.array(acts)
 
 
 def of(measured: Array, name: str) -> Array:
