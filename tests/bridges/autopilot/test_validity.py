@@ -59,8 +59,8 @@ def flown(fmu: Path, flag: str | None, **start: float) -> tuple[Array, Array, Ar
         now = rov.step([*given.values()], H)
     pilot.terminate()
     pilot.freeInstance()
-    measured, given, acts = zip(*rows, strict=True)
-    return np.array(measured), np.array(given), np.array(acts)
+    measured, moved, acts = zip(*rows, strict=True)
+    return np.array(measured), np.array(moved), np.array(acts)
 
 
 def of(measured: Array, name: str) -> Array:
