@@ -185,7 +185,7 @@ class Table:
 
     def _scaled(self, z: Array) -> Array:
         """Return what is proportional to a force of each coordinate that is no logarithm."""
-        return z - np.array([0.0 if p.kind == STRENGTH else p.null or 0.0 for p in self.parameters])
+        return np.asarray(z - np.array([0.0 if p.kind == STRENGTH else p.null or 0.0 for p in self.parameters]))
 
     @cached_property
     def _powers_of_scales(self) -> Array:
