@@ -158,9 +158,10 @@ def test_list_has_vehicles_and_companions_and_says_what_the_files_of_a_folder_ar
 
 
 COMMANDS = [
-    *("list", "identify", "inspect", "tune"),
-    *("simulate", "fly", "sitl", "system", "study"),
-    *("build", "export", "prove", "schema"),
+    *("identify", "fly", "build"),
+    *("inspect", "tune", "simulate", "list"),
+    *("sitl", "system", "study"),
+    *("export", "prove", "schema"),
 ]
 
 
