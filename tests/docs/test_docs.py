@@ -215,10 +215,11 @@ def _lines_of(pages: Sequence[Path]) -> set[str]:
 
 
 STOPPING = ROOT / "docs" / "tutorial-stopping-distance.md"
-"""Its commands are run where their results are looked at, in test_tutorials.py."""
+SENSORS = ROOT / "docs" / "sensors.md"
+"""Their commands are run where their results are looked at, in test_tutorials.py and test_sensors.py."""
 SHELL_PAGES: list[Path] = []
 for one in PAGES:
-    if one not in (*NOTEBOOKS, STOPPING) and not _lines_of([one]) <= _lines_of(SHELL_PAGES):
+    if one not in (*NOTEBOOKS, STOPPING, SENSORS) and not _lines_of([one]) <= _lines_of(SHELL_PAGES):
         SHELL_PAGES.append(one)
 """The pages with a command that no page before them has."""
 PLATFORMS = ROOT / "docs" / "platforms.md"
@@ -235,7 +236,7 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("default:.*commands saturate")
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
+@pytest.mark.parametrize("page", [page for page in PAGES if "print(" in "".join(blocks(page, "python"))], ids=name)
 def test_programs_print_what_is_said(
     page: Path, workplace: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:

@@ -331,7 +331,7 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
         part = np.flatnonzero(moving)
         H = information[np.ix_(part, part)] + damping * np.diag(weight[part])
         held = information[np.ix_(part, np.flatnonzero(~moving))] @ change[~moving]
-        change[part] = -np.linalg.solve(H, gradient[part] + held)
+        change[part] = -_solved(H, gradient[part] + held)
         ends = np.clip(z + change, objective.low, np.minimum(objective.high, np.where(is_size, z + _UP, np.inf)))
         beyond = moving & (ends != z + change)
         change = np.where(beyond, ends - z, change)
@@ -339,6 +339,16 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
             break
         moving &= ~beyond
     return z + change
+
+
+def _solved(H: Array, right: Array) -> Array:
+    """Return the solution of H x = right: the shortest one where exact data leave no digit of H for the priors."""
+    try:
+        found = np.linalg.solve(H, right)
+    except np.linalg.LinAlgError:
+        size = 1.0 / np.sqrt(np.diag(H))
+        found = size * np.linalg.lstsq(size[:, None] * H * size, size * right)[0]
+    return np.asarray(found, np.float64)
 
 
 def evidence(objective: Objective, minimum: Minimum) -> float:
