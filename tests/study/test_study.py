@@ -157,6 +157,7 @@ def test_a_vehicle_has_the_rows_of_its_fmu(videoray_fmu: Path, tmp_path: Path) -
     pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.long
 def test_workers_of_dask_give_the_same_bits(
     foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -221,6 +222,7 @@ def test_a_folder_of_an_earlier_version_is_refused_in_one_line(
     assert len(Results(folder).runs) == len([*(folder / "runs").iterdir()]) == 2
 
 
+@pytest.mark.long
 def test_nothing_is_written_for_an_fmu_that_cannot_run_here(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What another plan did stays, also with --force."""
     other = "win64" if sys.platform != "win32" else "linux64"

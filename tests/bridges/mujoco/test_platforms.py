@@ -14,6 +14,7 @@ from rov_fmu.c.compile import PLATFORMS, compile_engine
 from rov_fmu.tank.arrays import Array
 from tests.bridges.test_mujoco import loaded
 from tests.fmu.test_binaries import MACHINES
+from tests.often import spread
 from verification.references.c_programs import compile_c, run_program
 
 
@@ -41,7 +42,6 @@ def run(name: str, platform: str, folder: Path) -> Array:
     return np.array([[struct.unpack(">d", bytes.fromhex(x))[0] for x in line] for line in done.lines])
 
 
-@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="the programs are run on Linux")
 @pytest.mark.parametrize("platform", spread(["aarch64-linux", "win64"], (), ["aarch64-linux"]))
 @pytest.mark.parametrize("name", ["every_option", "bluerov2"])
