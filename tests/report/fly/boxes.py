@@ -4,7 +4,7 @@ from typing import Any
 
 WIDTHS = (400, 800, 1280)
 """The widths of a phone, a tablet and a laptop, px."""
-SCREENS = ((400, "dark"), (800, "light"), (1280, "dark"), (1280, "light"))
+SCREENS = ((400, "dark"), (800, "light"), (1280, "dark"))
 """Each width once, and both colour schemes: where a text stands does not depend on its colour."""
 
 _RECORD = """() => {
