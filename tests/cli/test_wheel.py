@@ -81,7 +81,7 @@ def test_the_wheel_holds_the_package_and_its_data_alone(wheel: Path) -> None:
     assert "rov_fmu/py.typed" in ours
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_installed_command_does_everything_outside_the_checkout(
     made_once: Made, tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
 ) -> None:
@@ -136,7 +136,7 @@ def test_vehicles_that_ship_need_no_compiler(full_wheel: Path, tmp_path: Path, m
     assert failed.value.stderr.startswith("rov-fmu: the C compiler is missing: pip install ziglang, or put ")
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")
     sdist = built("sdist", tmp_path / "sdist")

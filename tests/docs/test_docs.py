@@ -222,13 +222,12 @@ for one in PAGES:
     if one not in (*NOTEBOOKS, STOPPING, SENSORS) and not _lines_of([one]) <= _lines_of(SHELL_PAGES):
         SHELL_PAGES.append(one)
 """The pages with a command that no page before them has."""
-PLATFORMS = ROOT / "docs" / "platforms.md"
-"""It builds for all of them, as tests/fmu/test_binaries.py does."""
+AT_EACH_SUBMISSION = [README, ROOT / "docs" / "system.md"]
+"""The first commands of a newcomer, and those with the most parts."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
-@pytest.mark.long
-@pytest.mark.parametrize("page", spread(SHELL_PAGES, (), set(SHELL_PAGES) - {PLATFORMS}), ids=name)
+@pytest.mark.parametrize("page", spread(SHELL_PAGES, (), AT_EACH_SUBMISSION), ids=name)
 def test_commands_run(page: Path, workplace: Path) -> None:
     for block in runnable(page):
         run(workplace, "bash", "-euc", block)

@@ -61,14 +61,13 @@ TRUE_POSITION = (
 FAILS = f"{TRUE_POSITION}, lost_from_velocity = 20, lost_for_velocity = 20"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("told", "start"),
     [
-        ("`ideal = 1`", "ideal = 1"),
-        ("as they start, but with the true position", TRUE_POSITION),
-        ("the same, and the DVL fails for 20 s", FAILS),
-        ("as they start, with the USBL", ""),
+        pytest.param("`ideal = 1`", "ideal = 1", marks=pytest.mark.weekly),
+        pytest.param("as they start, but with the true position", TRUE_POSITION, marks=pytest.mark.weekly),
+        pytest.param("the same, and the DVL fails for 20 s", FAILS, marks=pytest.mark.long),
+        pytest.param("as they start, with the USBL", "", marks=pytest.mark.weekly),
     ],
 )
 def test_the_heavy_keeps_station_as_the_page_says(

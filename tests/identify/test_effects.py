@@ -238,7 +238,7 @@ def identified(folder: Path, rov: str, columns: Mapping[str, np.ndarray], name: 
     return identify(load_tests(folder_of(folder, rov, {name: "\n".join([",".join(columns), *rows])})))
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 @pytest.mark.parametrize("lost", [12.0, 0.0])
 def test_thrust_that_falls_with_the_speed_is_found(lost: float, tmp_path: Path) -> None:
     """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the stopping distance has no thrust."""
@@ -301,7 +301,7 @@ def moved(drag: Callable[[float], float]) -> tuple[Columns, np.ndarray, np.ndarr
         pytest.param(0.8, -0.2, marks=pytest.mark.long),
     ],
 )
-@pytest.mark.long
+@pytest.mark.weekly
 def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float, offset: float, tmp_path: Path) -> None:
     """They move no answer: V_ss are those of 78 c |c| = 38 |V| V + 9 V. Without them, nothing is told."""
     columns, position, velocity = moved(lambda v: 38.0 * abs(v) * v + 9.0 * v)
@@ -320,7 +320,7 @@ def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float,
     assert any(effect.is_unusual for effect in kept.values()) == (abs(log(scale)) > 0.2)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
     """The drag is 38 |u| u |2 u|^(-1/2) + 4 u. The file has the nearest linear and quadratic drag.
 
@@ -385,7 +385,7 @@ def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
     assert is_short or contains(result.vehicle.intervals["T_top"], lag)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 @pytest.mark.parametrize("lag", [0.6, 0.0])
 def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
     result = of_depth(tmp_path, HELD, 0.005, sensor=lag)

@@ -46,7 +46,7 @@ def least_without_evidence(fit: Fit) -> float:
     return minimise(fit.objective.without(indices), fit.best.z).value if indices else fit.best.value
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_file_is_a_minimum_without_the_weakest_effects(tmp_path: Path) -> None:
     """J rises by 2 at most, to a tenth. `vehicle_of_file` compares J of the numbers of the file with that of the fit,
     and a fit from elsewhere is not better."""
@@ -88,7 +88,7 @@ def test_intervals_contain_the_truth_whatever_the_size_of_a_load(load: float, se
     assert sum(covered) >= binom.ppf(0.001, len(covered), 0.9), covered
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
     fit: Fit, short: Given, tmp_path: Path
 ) -> None:

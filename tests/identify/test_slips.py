@@ -248,7 +248,7 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
     assert tried == [int(is_suspected)]
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
     """A sensor that shows nothing but noise is no slip, and hides none."""
     kinds = "depths a hundredfold", "radians under degrees"

@@ -97,7 +97,7 @@ def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
     assert not own.indices_of("force", "sway")
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
     """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more.
 
@@ -151,7 +151,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
     assert fell["slow gain", None] > 1.0, "the other parameters are fitted again"
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_slow_force_that_the_other_parameters_explain_as_well_is_none(tmp_path: Path) -> None:
     """Of a depth that drifts. Without a slow force, J rises by 68, but by 16 if the others are fitted again."""
     path = folder_of(tmp_path, KNOWN, FORCES)

@@ -94,7 +94,7 @@ def check_idle(folder: Path, battery: Battery, seed: int, count: int) -> None:
                 assert abs(value - without) < 0.25 * 0.5 * abs(high - low), (answer, unlogged)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_voltage_that_acts_on_nothing_changes_no_answer(tmp_path: Path) -> None:
     """It sags with time and under load, and the speed of the thrusters is regulated."""
     check_idle(tmp_path, Battery(0.0, sag=0.1, droop=0.1), 0, 1)

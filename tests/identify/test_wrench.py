@@ -211,7 +211,7 @@ for name, direction in {
 MIX += "[axes.surge]\n"
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
     """The motion under commands is that of the simulation under the sum of the thrusters, written by hand.
 
@@ -244,7 +244,7 @@ def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
     assert run["z"] == pytest.approx(depth, abs=0.03 * np.ptp(depth))
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_weak_thrusters_are_told_and_their_forces_are_those_of_loads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -111,7 +111,7 @@ def test_what_needs_thrust_is_not_known_where_nothing_tells_the_thrust(tmp_path:
     assert c["b_d_u"] * c["beta_u"] / MASS == pytest.approx(B / M, rel=0.05)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_log_with_thrust_beside_free_decays_gives_the_steady_velocity(tmp_path: Path) -> None:
     exact = HEAD + THRUSTER + "[priors]\nthrust = 0\n"
     write(tmp_path, exact, "velocity [m/s]", [(1.2, 0.0), (-1.0, 0.0), (0.8, 0.5)])

@@ -1052,7 +1052,7 @@ def test_another_minimum_is_no_evidence_for_a_hypothesis(
     assert {*search.now.starts} == names
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_wrong_hypothesis_is_taken_back(ill_model: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
     """If the voltage is taken to fall, because nothing else was thought of, the alarm stays.
 

@@ -190,7 +190,7 @@ def test_j_is_the_sum_of_its_parts(objective: Objective, point: Array) -> None:
     assert objective.value(point, runs) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objective, point: Array) -> None:
     """Without each log and without each row, from the minimum for all data."""
     best = minimise(objective, point)

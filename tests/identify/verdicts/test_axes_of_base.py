@@ -141,7 +141,7 @@ def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
     assert all({form.axis for form in one.layout.axes} == {*sensors, *unseen} for one in logs)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_it_is_told_why_a_log_identifies_no_axis(tmp_path: Path) -> None:
     """Nobody steers, and the heading is logged; nothing shows surge and sway."""
     rov, time = load("bluerov2"), np.arange(0.0, 20.0, 0.2)
