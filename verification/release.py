@@ -39,8 +39,6 @@ from verification.fresh_environment import environment
 
 _TOOLS = {"native": ("rov-fmu", "ziglang"), "pythonfmu": ("rov-fmu", "pythonfmu")}
 """The packages that make an FMU of each kind, parts of which are in its binaries."""
-
-
 _CODE = ("rov_fmu", "fmu_src", "models", "build_fmu.py", "build_backend.py", "pyproject.toml")
 """What a release is made of, in a checkout."""
 

@@ -124,11 +124,10 @@ class Model {
     const place = this.places.get(name);
     if (place === undefined) return;
     const { pulse, commands } = this.vehicle;
-    this.values[place] = value;
-    if (!commands.includes(name)) return;
-    const held = Math.max(-1, Math.min(1, value));
+    const isCommand = commands.includes(name);
+    const held = isCommand ? Math.max(-1, Math.min(1, value)) : value;
     this.values[place] = held;
-    if (pulse) {
+    if (isCommand && pulse) {
       const [low, neutral, high] = pulse;
       this.fractions.set(name, held);
       this.values[place] = neutral + held * (held > 0 ? high - neutral : neutral - low);

@@ -19,10 +19,10 @@ def version() -> str:
     if ".dev" not in __version__:
         return __version__
     digest = sha256()
-    for folder, others in ((_CODE, ("data", "__pycache__")), (FMU_SRC, ("__pycache__",))):
+    for folder in (_CODE, FMU_SRC):
         for path in sorted(path for path in folder.rglob("*") if path.is_file()):
             name = path.relative_to(folder)
-            if not {*others} & {*name.parts}:
+            if not {"data", "__pycache__"} & {*name.parts}:  # data/ of an installed package has fmu_src, too
                 digest.update(b"%s %d\n" % (name.as_posix().encode(), path.stat().st_size) + path.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:10]}"
 

@@ -175,7 +175,8 @@ def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[st
 def deviations(structure: SystemStructure, read: Sequence[Name], rows: Array) -> dict[Name, Array]:
     """Return how far each place and angle is from where an autopilot holds it, by its name; NaN while none does.
 
-    Where sensors tell it the autopilot, it is how far the truth is."""
+    Where the autopilot gets them from sensors, those of the vehicle itself are compared.
+    """
     columns = {name: n for n, name in enumerate(read)}
     sources = {one.end: one.start for one in structure.connections if one.start in columns}
     found: dict[Name, Array] = {}

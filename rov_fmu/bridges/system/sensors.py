@@ -73,14 +73,7 @@ def _parameters() -> Iterator[tuple[str, str, float, float, float, str]]:
     """Yield name, unit, start, minimum, maximum and description of the parameters, in the order of sensors.c."""
     yield "ideal", "1", 0.0, 0.0, 1.0, "1: the sensors tell the truth, and no parameter below counts"
     yield "seed", "1", 1.0, 0.0, 2.0**53, "Which noise: a whole number"
-    yield (
-        "seabed",
-        "m",
-        0.0,
-        0.0,
-        1e6,
-        "Depth of the seabed; 0: it is not known, and the DVL has lock",
-    )
+    yield "seabed", "m", 0.0, 0.0, 1e6, "Depth of the seabed; 0: it is not known, and the DVL has lock"
     for name, one in _INSTRUMENTS.items():
         yield f"rate_{name}", "1/s", one.rate, 0.0, 1e4, f"Samples per second of the {one.words}; 0: one in each step"
         yield f"delay_{name}", "s", one.delay, 0.0, 1e4, f"Delay of the {one.words}, at most 31 samples"

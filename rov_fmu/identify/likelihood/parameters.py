@@ -191,6 +191,7 @@ class Table:
     def _powers_of_scales(self) -> Array:
         """The powers of the scales of forces to which each number is proportional, k x p."""
         power, of = self.each("of_kind.force_power"), [p.of for p in self.parameters]
+        # The axes that share a thruster have one scale: the names of the axes, and the gains of their thrusters.
         groups, curves = list[tuple[set[str], set[int]]](), dict[int, list[int]]()
         for axis in self.layout.bare_axes:
             names, gains = {axis.name}, set[int]()
@@ -204,6 +205,7 @@ class Table:
                         curves.setdefault(scale, []).append(strength)
                 elif scale is not None:
                     gains.add(scale)
+            # This axis joins all groups that have one of its gains, or an axis that is coupled to it.
             linked = [one for one in groups if one[0] & names or one[1] & gains]
             names, gains = names.union(*(one[0] for one in linked)), gains.union(*(one[1] for one in linked))
             groups = [*(one for one in groups if one not in linked), (names, gains)]

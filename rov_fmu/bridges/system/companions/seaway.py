@@ -191,8 +191,10 @@ class Seaway(Companion):
             t = tanh(k * self.seabed)
             k -= (k * t - deep) / (t + k * self.seabed * (1.0 - t * t))
         U = self.current_N * cos(direction) + self.current_E * sin(direction)
-        if U == 0.0 or omega / k + U <= 0.0:
-            return inf if U else k
+        if U == 0.0:
+            return k
+        if omega / k + U <= 0.0:
+            return inf
         k = omega / (omega / k + U)
         for _ in range(50):
             t = tanh(k * self.seabed)
